@@ -1,0 +1,266 @@
+"""The one configuration: every dimension, limit and behaviour, validated, units in the names.
+
+The models mirror ``keyhole.toml`` beside this module. They read no files themselves; give
+:func:`parse` what a TOML reader returned.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from robot.errors import ConfigurationError
+
+SCHEMA_VERSION = 1
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Length = Annotated[float, Field(gt=0, le=2, allow_inf_nan=False)]
+Vector = tuple[Finite, Finite, Finite]
+
+
+def _unit(value: Vector) -> Vector:
+    norm = math.sqrt(sum(x * x for x in value))
+    if norm < 1e-6:
+        raise ValueError("a direction must not be zero")
+    return (value[0] / norm, value[1] / norm, value[2] / norm)
+
+
+class Section(BaseModel):
+    """A table of the configuration: unknown keys are refused, values cannot be changed later."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
+
+
+class Trocar(Section):
+    """Where the shaft passes the body wall (base frame), and the wall's looks."""
+
+    position_m: Vector
+    wall_normal: Vector
+    wall_radius_m: Length
+    wall_thickness_m: Length
+
+
+class Start(Section):
+    """The configuration in which the robot wakes up."""
+
+    shaft_direction: Vector
+    bend_direction_up: Vector
+    bend_deg: Annotated[float, Field(ge=0, le=170)]
+    direction_deg: Annotated[float, Field(ge=-360, le=360)]
+    lambda_along_shaft: Annotated[float, Field(gt=0, lt=1)]
+
+
+class Instrument(Section):
+    """Shaft and continuum segment."""
+
+    shaft_length_m: Length
+    shaft_diameter_m: Length
+    segment_length_m: Length
+    disk_count: Annotated[int, Field(ge=2, le=64)]
+    disk_diameter_m: Length
+    tendon_pitch_radius_m: Length
+    tendon_diameter_m: Length
+    shaft_mass_kg: Positive
+
+    @model_validator(mode="after")
+    def _tendons_inside_the_disk(self) -> Instrument:
+        if 2 * self.tendon_pitch_radius_m + self.tendon_diameter_m >= self.disk_diameter_m:
+            raise ValueError("tendon_pitch_radius_m must leave the tendons inside disk_diameter_m")
+        return self
+
+
+class Module(Section):
+    """The instrument module on the flange: where the shaft leaves, pulleys, servos."""
+
+    shaft_base_m: Vector
+    shaft_direction: Vector
+    bend_direction: Vector
+    pulley_radius_m: Length
+    servo_ticks_per_turn: Annotated[int, Field(ge=64, le=2**22)]
+    servo_range_deg: Annotated[float, Field(gt=0, le=360)]
+    servo_speed_deg_s: Annotated[float, Field(gt=0, le=2000)]
+    adapter_size_m: tuple[Length, Length]
+    mass_kg: Positive
+    centre_of_mass_m: Vector
+
+    @model_validator(mode="after")
+    def _directions_are_perpendicular(self) -> Module:
+        shaft, bend = _unit(self.shaft_direction), _unit(self.bend_direction)
+        if abs(sum(a * b for a, b in zip(shaft, bend, strict=True))) > 1e-9:
+            raise ValueError("bend_direction must be perpendicular to shaft_direction")
+        return self
+
+
+class Limits(Section):
+    """What the controller never leaves."""
+
+    bend_deg: Annotated[float, Field(gt=0, le=170)]
+    lambda_min: Annotated[float, Field(ge=0, lt=1)]
+    lambda_max: Annotated[float, Field(gt=0, le=1)]
+    joint_speed_rad_s: Annotated[float, Field(gt=0, le=3.14)]
+    joint_margin_deg: Annotated[float, Field(ge=0, le=30)]
+    approach_gain: Annotated[float, Field(gt=0, le=1)]
+    tip_jump_mm: Positive
+    tip_jump_deg: Positive
+    target_distance_mm: Positive
+    tracking_error_rad: Positive
+
+    @model_validator(mode="after")
+    def _lambda_interval(self) -> Limits:
+        if self.lambda_min >= self.lambda_max:
+            raise ValueError("lambda_min must be below lambda_max")
+        return self
+
+
+class Commands(Section):
+    """Resolved rates, paper eqs. (97)-(101), with the switch read as ``|e| > epsilon * gamma``."""
+
+    feed_forward: bool
+    speed_max_mm_s: Annotated[float, Field(gt=0, le=500)]
+    speed_min_mm_s: NotNegative
+    position_threshold_mm: Positive
+    position_ramp: Annotated[float, Field(gt=1)]
+    angular_speed_max_deg_s: Annotated[float, Field(gt=0, le=360)]
+    angular_speed_min_deg_s: NotNegative
+    orientation_threshold_deg: Positive
+    orientation_ramp: Annotated[float, Field(gt=1)]
+    rcm_gain_per_s: Annotated[float, Field(ge=0, le=200)]
+
+
+class Priority(Section):
+    """Which command matters most, and what the remaining freedom is used for."""
+
+    case: Literal["0", "1", "2", "pointing"]
+    solver: Literal["hqp", "closed-form", "augmented"]
+    coordinates: Literal["uv", "polar"]
+    characteristic_length_m: Annotated[float, Field(gt=0, le=10)]
+    lambda_reference: Annotated[float, Field(gt=0, lt=1)]
+    lambda_gain_per_s: NotNegative
+    posture_gain_per_s: NotNegative
+
+
+class Teleoperation(Section):
+    """From the leader's motion to the desired tip motion."""
+
+    motion_scale: Positive
+    motion_scale_min: Positive
+    motion_scale_max: Positive
+    alignment: Literal["relative", "matched"]
+    alignment_tolerance_deg: Annotated[float, Field(gt=0, le=180)]
+    hold_to_move: bool
+    gizmo_timeout_ms: Positive
+    api_timeout_ms: Positive
+
+    @model_validator(mode="after")
+    def _scale_inside_its_range(self) -> Teleoperation:
+        if not self.motion_scale_min <= self.motion_scale <= self.motion_scale_max:
+            raise ValueError("motion_scale must lie between motion_scale_min and motion_scale_max")
+        return self
+
+
+class Control(Section):
+    """The control process."""
+
+    rate_hz: Annotated[float, Field(ge=10, le=2000)]
+    realtime: Literal["auto", "off"]
+    record_ring_seconds: Annotated[float, Field(ge=1, le=600)]
+
+
+class Server(Section):
+    """The one public port."""
+
+    host: str
+    port: Annotated[int, Field(ge=0, le=65535)]
+    lease_seconds: Annotated[float, Field(ge=1, le=600)]
+
+
+class Joint(Section):
+    """A revolute joint about its own z axis."""
+
+    name: str
+    origin_xyz_m: Vector
+    origin_rpy_rad: Vector
+    lower_rad: Finite
+    upper_rad: Finite
+    speed_rad_s: Positive
+    effort_nm: Positive
+    damping_nm_s_rad: NotNegative
+
+    @model_validator(mode="after")
+    def _range(self) -> Joint:
+        if self.lower_rad >= self.upper_rad:
+            raise ValueError("lower_rad must be below upper_rad")
+        return self
+
+
+class Link(Section):
+    """Mass properties of a link, in its own frame."""
+
+    name: str
+    mass_kg: Positive
+    centre_of_mass_m: Vector
+    inertia_kg_m2: tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+
+
+class Arm(Section):
+    """The seven joints and eight links (the first is the base)."""
+
+    name: str
+    joints: Annotated[tuple[Joint, ...], Field(min_length=7, max_length=7)]
+    links: Annotated[tuple[Link, ...], Field(min_length=8, max_length=8)]
+
+
+class Configuration(Section):
+    """Everything that describes one Keyhole."""
+
+    schema_version: Literal[1]
+    trocar: Trocar
+    start: Start
+    instrument: Instrument
+    module: Module
+    limits: Limits
+    commands: Commands
+    priority: Priority
+    teleoperation: Teleoperation
+    control: Control
+    server: Server
+    arm: Arm
+
+    @model_validator(mode="after")
+    def _start_inside_the_limits(self) -> Configuration:
+        if self.start.bend_deg > self.limits.bend_deg:
+            raise ValueError("start.bend_deg must not exceed limits.bend_deg")
+        if not self.limits.lambda_min < self.start.lambda_along_shaft < self.limits.lambda_max:
+            raise ValueError("start.lambda_along_shaft must lie between the lambda limits")
+        return self
+
+    def hash64(self) -> int:
+        """First 63 bits of the SHA-256 of the canonical JSON form: the mark every record carries."""
+        digest = hashlib.sha256(self.model_dump_json().encode()).digest()
+        return int.from_bytes(digest[:8], "big") >> 1
+
+
+def parse(table: dict[str, Any], file: str) -> Configuration:
+    """Validate what a TOML reader returned.
+
+    Args:
+        table: the parsed TOML.
+        file: name of the file, for the error message.
+
+    Raises:
+        ConfigurationError: names file, key, value and the allowed range of the first wrong value.
+    """
+    try:
+        return Configuration.model_validate(table)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join(str(part) for part in first["loc"]) or "(whole file)"
+        value = "(missing)" if first["type"] == "missing" else first["input"]
+        if isinstance(value, (dict, Section)):
+            value = "(table)"
+        raise ConfigurationError(file, key, value, first["msg"]) from None

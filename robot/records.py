@@ -1,0 +1,255 @@
+"""What one tick takes and gives, as numpy record types.
+
+Positions in metres and base frame, orientations as unit quaternions (w, x, y, z) or rotation
+matrices, angles in radians. Every field is eight bytes wide so that a record is a flat block of
+memory that can be mapped, copied and compared byte by byte.
+
+Words (one meaning each): *desired* comes from the operator, *commanded* is what the controller
+integrates, *measured* comes from encoders, *true* is the simulator's own.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+SCHEMA_VERSION = 1
+
+ARM_JOINTS = 7
+SERVOS = 4
+U, V, LAMBDA = 7, 8, 9
+"""Places of the segment's (u, v) and of lambda in the augmented configuration ``x`` (10)."""
+
+
+class Safety(IntEnum):
+    """Safety states (names after the Collaborative Robotics Toolkit)."""
+
+    DISABLED = 0
+    ENABLED = 1
+    PAUSED = 2
+    FAULT = 3
+
+
+class Request(IntEnum):
+    """What an operator may ask of the safety state."""
+
+    NONE = 0
+    ENABLE = 1
+    DISABLE = 2
+    PAUSE = 3
+    RESET = 4
+    EMERGENCY_STOP = 5
+
+
+class LeaderKind(IntEnum):
+    """Who leads the tip."""
+
+    NONE = 0
+    GIZMO = 1
+    API_POSE = 2
+    API_TARGET = 3
+    PATH = 4
+
+
+class Case(IntEnum):
+    """Priority presets, below the RCM: balanced, linear first, angular first, pointing."""
+
+    BALANCED = 0
+    LINEAR_FIRST = 1
+    ANGULAR_FIRST = 2
+    POINTING = 3
+
+
+class Solver(IntEnum):
+    """How the levels are solved."""
+
+    HQP = 0
+    CLOSED_FORM = 1
+    AUGMENTED = 2
+
+
+class Coordinates(IntEnum):
+    """Segment coordinates of the closed forms."""
+
+    UV = 0
+    POLAR = 1
+
+
+class Alignment(IntEnum):
+    """What the leader's absolute orientation means when the clutch closes."""
+
+    RELATIVE = 0
+    MATCHED = 1
+
+
+class ErrorSource(IntEnum):
+    """What the reported errors are measured against."""
+
+    TRUE = 0
+    MEASURED = 1
+
+
+SETTINGS = np.dtype(
+    [
+        ("case", "i8"),
+        ("solver", "i8"),
+        ("coordinates", "i8"),
+        ("feed_forward", "i8"),
+        ("alignment", "i8"),
+        ("hold_to_move", "i8"),
+        ("lock_rotation", "i8"),
+        ("lock_translation", "i8"),
+        ("motion_scale", "f8"),
+        ("lambda_reference", "f8"),
+        ("rotation_base_leader", "f8", (3, 3)),
+    ]
+)
+"""The operator's choices. ``rotation_base_leader`` turns leader motion into the base frame."""
+
+LEADER = np.dtype(
+    [
+        ("kind", "i8"),
+        ("sequence", "i8"),
+        ("clutch", "i8"),
+        ("absolute", "i8"),
+        ("age_s", "f8"),
+        ("timeout_s", "f8"),
+        ("smoothing_s", "f8"),
+        ("position", "f8", 3),
+        ("wxyz", "f8", 4),
+    ]
+)
+"""The newest sample of the active leader. ``absolute``: the pose is a tip pose in the base frame
+rather than a motion relative to the clutch's anchor. ``smoothing_s``: time constant over which
+coarse samples are interpolated; 0 takes them as they are."""
+
+INPUT = np.dtype(
+    [
+        ("dt_s", "f8"),
+        ("request", "i8"),
+        ("hold", "i8"),
+        ("measured_valid", "i8"),
+        ("measured_age_s", "f8"),
+        ("measured_q", "f8", ARM_JOINTS),
+        ("measured_servo", "f8", SERVOS),
+        ("trocar_position", "f8", 3),
+        ("trocar_velocity", "f8", 3),
+        ("settings", SETTINGS),
+        ("leader", LEADER),
+    ]
+)
+
+STATE = np.dtype(
+    [
+        ("tick", "i8"),
+        ("safety", "i8"),
+        ("reason", "i8"),
+        ("engaged", "i8"),
+        ("leader_kind", "i8"),
+        ("leader_sequence", "i8"),
+        ("leader_position", "f8", 3),
+        ("leader_rotation", "f8", (3, 3)),
+        ("x", "f8", 10),
+        ("arm_position", "f8", 3),
+        ("arm_rotation", "f8", (3, 3)),
+        ("arm_jacobian", "f8", (6, ARM_JOINTS)),
+        ("tip_position", "f8", 3),
+        ("tip_rotation", "f8", (3, 3)),
+        ("desired_position", "f8", 3),
+        ("desired_rotation", "f8", (3, 3)),
+        ("anchor_leader_position", "f8", 3),
+        ("anchor_leader_rotation", "f8", (3, 3)),
+        ("anchor_tip_position", "f8", 3),
+        ("anchor_tip_rotation", "f8", (3, 3)),
+        ("anchor_scale", "f8"),
+        ("anchor_lock_rotation", "i8"),
+        ("anchor_lock_translation", "i8"),
+        ("anchor_rotation_base_leader", "f8", (3, 3)),
+    ]
+)
+"""Everything the robot remembers. ``x`` is the commanded configuration; the ``arm_*`` and ``tip_*``
+fields are its forward kinematics, kept so that each tick computes them once (``arm_jacobian``:
+rows linear then angular, of the point that coincides with the base origin, base frame)."""
+
+COMMAND = np.dtype(
+    [
+        ("q", "f8", ARM_JOINTS),
+        ("servo", "f8", SERVOS),
+        ("moving", "i8"),
+    ]
+)
+"""Joint and servo angles to go to; ``moving`` is 0 for a zero-motion command."""
+
+REPORT = np.dtype(
+    [
+        ("desired_position", "f8", 3),
+        ("desired_wxyz", "f8", 4),
+        ("commanded_position", "f8", 3),
+        ("commanded_wxyz", "f8", 4),
+        ("x", "f8", 10),
+        ("x_dot", "f8", 10),
+        ("theta", "f8"),
+        ("delta", "f8"),
+        ("twist", "f8", 6),
+        ("residual_rcm", "f8"),
+        ("residual_linear", "f8"),
+        ("residual_angular", "f8"),
+        ("limits_active", "i8"),
+        ("solver_status", "i8"),
+        ("target_refused", "i8"),
+    ]
+)
+"""What the controller did. ``twist``: commanded tip twist (linear, angular). ``residual_*``: norms
+of what each level could not do, m/s and rad/s. ``limits_active``: bits, see robot.priority.limits."""
+
+OUTCOME = np.dtype([("state", STATE), ("command", COMMAND), ("report", REPORT)])
+"""What ``tick`` returns: the next state, the command, the report."""
+
+TRUTH = np.dtype(
+    [
+        ("source", "i8"),
+        ("position", "f8", 3),
+        ("wxyz", "f8", 4),
+        ("shaft_base", "f8", 3),
+        ("shaft_end", "f8", 3),
+        ("q", "f8", ARM_JOINTS),
+        ("uv", "f8", 2),
+        ("lambda_along_shaft", "f8"),
+        ("position_error", "f8"),
+        ("orientation_error", "f8"),
+        ("rcm_error", "f8"),
+    ]
+)
+"""Where the robot is: the simulator's truth, or the forward kinematics of what was measured
+(``source``, an :class:`ErrorSource`), and the errors against it: desired minus it."""
+
+HEADER = np.dtype(
+    [
+        ("schema_version", "i8"),
+        ("robot", "S16"),
+        ("configuration_hash", "i8"),
+        ("tick", "i8"),
+        ("time_ns", "i8"),
+        ("dt_ns", "i8"),
+        ("stamp_ns", "i8"),
+        ("lateness_ns", "i8"),
+        ("tick_ns", "i8"),
+        ("overruns", "i8"),
+        ("request_sequence", "i8"),
+        ("path_id", "i8"),
+        ("path_progress", "f8"),
+    ]
+)
+"""``time_ns`` is the plant's clock, ``stamp_ns`` the host's monotonic clock at publication,
+``request_sequence`` the last request from outside that this tick had taken in."""
+
+RECORD = np.dtype(
+    [
+        ("header", HEADER),
+        ("input", INPUT),
+        ("outcome", OUTCOME),
+        ("truth", TRUTH),
+    ]
+)
+"""One tick of the first robot (``instrument``)."""
