@@ -1,0 +1,41 @@
+"""What every test may use: fixed seeds and the browser."""
+
+from __future__ import annotations
+
+import os
+import random
+import zlib
+
+import numpy as np
+import pytest
+
+from tests import browser
+
+
+@pytest.fixture(autouse=True)
+def fixed_seeds() -> None:
+    """Start every test from the same global seeds, whichever tests ran before it."""
+    random.seed(0)
+    np.random.seed(0)  # noqa: NPY002 - a library under test may draw from it
+
+
+@pytest.fixture
+def rng(request: pytest.FixtureRequest) -> np.random.Generator:
+    """Random numbers that differ from test to test but never from run to run."""
+    return np.random.default_rng(zlib.crc32(request.node.nodeid.encode()))
+
+
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """Path of the Chromium that browser tests start with ``tests.browser.ARGUMENTS``."""
+    path = browser.find()
+    if path is None:
+        pytest.fail(browser.advice())
+    return path
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name the checks that failed before pytest began, right above its closing line."""
+    failed = os.environ.get("KEYHOLE_FAILED_CHECKS")
+    if failed:
+        terminalreporter.write_line(f"FAILED before pytest: {failed} (see the top)", red=True)
