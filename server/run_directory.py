@@ -153,7 +153,9 @@ class RunDirectory:
     def write(self, name: str, content: bytes) -> Path:
         """Write a file, closed to others, that appears whole or not at all; returns its path."""
         unfinished = self.path / f".{name}.new"
-        descriptor = os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o600)
+        descriptor = os.open(
+            unfinished, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o600
+        )
         with open(descriptor, "wb") as file:
             file.write(content)
         os.replace(unfinished, self.path / name)
