@@ -1,0 +1,18 @@
+// Numbers as people read them: a fixed count of digits, a true minus sign.
+
+/** Three significant places or so, never exponents: 0.012, 1.24, 18.3, 240. */
+export function figure(value) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  const places = size >= 99.95 ? 0 : size >= 9.995 ? 1 : size >= 0.9995 ? 2 : 3;
+  return fixed(value, places);
+}
+
+export function fixed(value, places) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  const text = value.toFixed(places);
+  const isZero = Number(text) === 0;
+  return isZero ? text.replace("-", "") : text.replace("-", "\u2212");
+}
+
+export const percent = (share) => `${Math.round(share * 100)} %`;

@@ -1,0 +1,120 @@
+// The keyboard. W, A, S, D, Q, E and the arrows belong to the scene's camera, so no shortcut is there.
+
+import { byId, make } from "/assets/dom.js";
+import { sceneWindow } from "/assets/scene.js";
+
+/** `press`: the control that the key presses. Every shortcut is listed in the help. */
+const KEYS = [
+  { key: "Escape", show: "Esc", words: "Emergency stop, also while typing" },
+  { key: " ", show: "Space", words: "Move while held (hold-to-move)" },
+  { key: "c", show: "C", words: "Take or release control", press: ["take-control", "release-control"] },
+  { key: "g", show: "G", words: "Enable (go)", press: ["enable"] },
+  { key: "p", show: "P", words: "Pause", press: ["pause"] },
+  { key: "x", show: "X", words: "Disable", press: ["disable"] },
+  { key: "r", show: "R", words: "Reset a fault", press: ["reset"] },
+  { key: "h", show: "H", words: "Hold-to-move on or off", press: ["hold-to-move"] },
+  { key: "1", show: "1 2 3 4", words: "Balanced, linear first, angular first, pointing", pick: ["case", "0"] },
+  { key: "2", pick: ["case", "1"] },
+  { key: "3", pick: ["case", "2"] },
+  { key: "4", pick: ["case", "pointing"] },
+  { key: "[", show: "[ ]", words: "Motion scale down, up" },
+  { key: "]" },
+  { key: "o", show: "O", words: "Lock rotation", press: ["lock-rotation"] },
+  { key: "t", show: "T", words: "Lock translation", press: ["lock-translation"] },
+  { key: "m", show: "M", words: "Alignment relative or matched", other: "alignment" },
+  { key: "v", show: "V", words: "Align with view", press: ["align-view"] },
+  { key: "k", show: "K", words: "Play or stop the path", press: ["stop-path", "play"] },
+  { key: "f", show: "F", words: "Freeze the plots", press: ["freeze"] },
+  { key: "z", show: "Z", words: "Time window of the plots", other: "window" },
+  { key: "n", show: "N", words: "Light or dark", press: ["theme"] },
+  { key: "?", show: "?", words: "This help", press: ["help"] },
+];
+
+/**
+ * Listen on the page and in the scene.
+ * `acts`: stop(), hold(down), scale(direction), refuse(reason), holdsToMove() -> bool.
+ */
+export function startKeys(acts) {
+  const listeners = { down: (event) => down(event, acts), up: (event) => up(event, acts) };
+  listen(window, listeners);
+  const release = () => setTimeout(() => document.hasFocus() || acts.hold(false));
+  window.addEventListener("blur", release);
+  document.addEventListener("visibilitychange", () => document.hidden && acts.hold(false));
+  const known = new WeakSet();
+  const attach = () => {
+    const inner = sceneWindow();
+    if (!inner || known.has(inner.document)) return;
+    known.add(inner.document);
+    listen(inner, listeners);
+    inner.addEventListener("blur", release);
+  };
+  byId("scene").addEventListener("load", attach);
+  // The scene may replace its document before it has loaded; its keys must work by then.
+  setInterval(attach, 250);
+  fillHelp();
+}
+
+function listen(target, { down, up }) {
+  target.addEventListener("keydown", down, { capture: true });
+  target.addEventListener("keyup", up, { capture: true });
+}
+
+function down(event, acts) {
+  if (event.key === "Escape") {
+    if (!event.repeat) acts.stop();
+    return;
+  }
+  if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
+  if (event.key === " ") {
+    if (!acts.holdsToMove()) return;
+    event.preventDefault();
+    if (!event.repeat) acts.hold(true);
+    return;
+  }
+  const shortcut = KEYS.find((entry) => entry.key === event.key.toLowerCase());
+  if (!shortcut) return;
+  event.preventDefault();
+  event.stopPropagation();
+  if (shortcut.key === "[" || shortcut.key === "]") acts.scale(shortcut.key === "]" ? 1 : -1);
+  else if (!event.repeat) run(shortcut, acts);
+}
+
+function up(event, acts) {
+  if (event.key !== " ") return;
+  // A button under focus must not take the release for a press.
+  if (acts.holdsToMove() && !isTyping(event.target)) event.preventDefault();
+  acts.hold(false);
+}
+
+function run({ press, pick, other }, acts) {
+  let control;
+  if (press) control = press.map(byId).find((element) => isUsable(element)) ?? byId(press.at(-1));
+  else if (pick) control = document.querySelector(`input[name="${pick[0]}"][value="${pick[1]}"]`);
+  else control = nextOf(other);
+  if (control.disabled) acts.refuse(control.closest("[data-tip]").dataset.why);
+  else control.click();
+}
+
+const isUsable = (element) => !element.hidden && element.getAttribute("aria-disabled") !== "true";
+
+function nextOf(name) {
+  const all = [...document.querySelectorAll(`input[name="${name}"]`)];
+  return all[(all.findIndex((input) => input.checked) + 1) % all.length];
+}
+
+/** True where keys belong to a text field; a checkbox or a slider does not take letters. */
+function isTyping(target) {
+  const kind = target?.tagName;
+  if (kind === "INPUT") return !["checkbox", "radio", "range", "file", "button"].includes(target.type);
+  return kind === "TEXTAREA" || kind === "SELECT" || target?.isContentEditable === true;
+}
+
+function fillHelp() {
+  const body = byId("keys-table").tBodies[0];
+  for (const { show, words } of KEYS.filter((entry) => entry.show)) {
+    const row = body.insertRow();
+    const cell = row.insertCell();
+    for (const part of show.split(" ")) cell.append(make("kbd", "", part), " ");
+    row.insertCell().textContent = words;
+  }
+}

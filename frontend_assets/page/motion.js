@@ -1,0 +1,114 @@
+// Safety requests and hold-to-move.
+
+import { call, ROBOT } from "/assets/api.js";
+import { byId, onPress, setBlocked, setHidden, setText } from "/assets/dom.js";
+import { attempt, refuse } from "/assets/notices.js";
+
+const REQUESTS = ["enable", "pause", "disable", "reset"];
+const AGAIN_MS = 400;
+
+/** Where a request has no sense, and why. A missing entry means that it may be asked for. */
+const SENSELESS = {
+  enable: { ENABLED: "The robot is enabled already.", FAULT: "Reset the fault first." },
+  pause: {
+    DISABLED: "Nothing moves: the robot is disabled.",
+    PAUSED: "The robot is paused already.",
+    FAULT: "Nothing moves: the robot is in a fault.",
+  },
+  disable: { DISABLED: "The robot is disabled already.", FAULT: "Reset the fault first." },
+  reset: {
+    DISABLED: "There is no fault to reset.",
+    ENABLED: "There is no fault to reset.",
+    PAUSED: "There is no fault to reset.",
+  },
+};
+
+/** What a person most likely wants to press next. */
+const NEXT = { DISABLED: "enable", PAUSED: "enable", FAULT: "reset" };
+
+export class Motion {
+  /** `stream`: the WebSocket, which is faster than a request; `take(state)`: newest state. */
+  constructor(stream, take) {
+    this.stream = stream;
+    this.take = take;
+    this.stopped = -Infinity;
+    this.holdBlocked = "No connection to the server.";
+    for (const name of REQUESTS) onPress(byId(name), () => this.#ask(name), refuse);
+    byId("emergency-stop").addEventListener("pointerdown", (event) => event.button === 0 && this.stop());
+    byId("emergency-stop").addEventListener("click", () => this.stop());
+    this.#startHold(byId("hold"));
+  }
+
+  async #ask(name) {
+    const state = await attempt(call("POST", `${ROBOT}/${name}`));
+    if (state?.type === "state") this.take(state);
+  }
+
+  /** Both ways at once: whichever arrives first stops the robot; a second stop does no harm. */
+  async stop() {
+    const now = performance.now();
+    if (now - this.stopped < AGAIN_MS) return;
+    this.stopped = now;
+    this.stream.send({ type: "emergency-stop" });
+    try {
+      const state = await call("POST", `${ROBOT}/emergency-stop`);
+      if (state?.type === "state") this.take(state);
+    } catch (refusal) {
+      refuse(`Emergency stop not confirmed: ${refusal.message} Use the stop on the machine.`);
+    }
+  }
+
+  #startHold(button) {
+    button.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      if (this.holdBlocked) refuse(this.holdBlocked);
+      else {
+        button.setPointerCapture(event.pointerId);
+        this.hold(true);
+      }
+    });
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      button.addEventListener(end, () => this.hold(false));
+    }
+    button.addEventListener("keydown", (event) => {
+      if (event.key === "Enter" && !event.repeat) this.hold(true);
+    });
+    button.addEventListener("keyup", (event) => event.key === "Enter" && this.hold(false));
+    button.addEventListener("blur", () => this.hold(false));
+    button.addEventListener("contextmenu", (event) => event.preventDefault());
+  }
+
+  hold(down) {
+    if (down === this.stream.holding) return;
+    if (down && this.holdBlocked) return;
+    this.stream.hold(down);
+    this.#showHold(down);
+  }
+
+  #showHold(down) {
+    byId("hold").setAttribute("aria-pressed", String(down));
+    setText(byId("hold-text"), down ? "Moving while held" : "Move while held");
+  }
+
+  /** `blocked`: why this page may not drive, or "". */
+  show(state, blocked, up) {
+    const name = state.safety.state;
+    for (const request of REQUESTS) {
+      const open = request === "pause" && up;
+      const senseless = SENSELESS[request][name] ?? "";
+      setBlocked(byId(request), senseless || (open ? "" : blocked));
+      byId(request).classList.toggle("next", NEXT[name] === request && !blocked);
+    }
+    this.#showHoldable(state, blocked);
+    setHidden(byId("watcher-note"), blocked === "");
+    setText(byId("watcher-note"), blocked && up ? `Watching. ${blocked} The emergency stop works for everyone.` : blocked);
+  }
+
+  #showHoldable(state, blocked) {
+    const off = state.teleoperation.hold_to_move ? "" : "Hold-to-move is off: an enabled robot follows the leader.";
+    this.holdBlocked = blocked || off;
+    if (this.holdBlocked && this.stream.holding) this.hold(false);
+    setBlocked(byId("hold"), this.holdBlocked);
+    this.#showHold(this.stream.holding);
+  }
+}

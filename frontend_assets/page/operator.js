@@ -1,0 +1,84 @@
+// Who drives: take, release and hand over control. One person drives, the others watch.
+
+import { actUnder, call, ROBOT } from "/assets/api.js";
+import { byId, onPress, setBlocked, setHidden, setText } from "/assets/dom.js";
+import { attempt, refuse, tell } from "/assets/notices.js";
+
+const KEY = "keyhole-operator";
+
+export function startOperator() {
+  const field = byId("operator-name");
+  field.value = remembered();
+  field.addEventListener("change", () => {
+    field.value = field.value.trim() || remembered();
+    remember(field.value);
+  });
+  onPress(byId("take-control"), take, refuse);
+  onPress(byId("release-control"), release, refuse);
+  onPress(byId("hand-over"), () => {}, refuse);
+  byId("hand-over-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    const to = byId("hand-over-to").value.trim();
+    if (to && byId("hand-over").getAttribute("aria-disabled") !== "true") handOver(to);
+  });
+}
+
+async function take() {
+  const lease = await attempt(call("POST", `${ROBOT}/lease`, { operator: byId("operator-name").value }));
+  if (lease) actUnder(lease.lease_id);
+}
+
+async function release() {
+  await attempt(call("DELETE", `${ROBOT}/lease`));
+  actUnder(null);
+}
+
+async function handOver(to) {
+  const answer = await attempt(call("POST", `${ROBOT}/lease/hand-over`, { to }).then(() => true));
+  if (!answer) return;
+  byId("operator-popover").hidePopover();
+  tell(`Control is offered to ${to}.`);
+}
+
+/** Why this page may not drive now, or "". */
+export function whyNotDriving(state, up) {
+  if (!up) return "No connection to the server.";
+  if (state.operator.you) return "";
+  if (state.operator.name) return `${state.operator.name} drives. Ask for a hand over.`;
+  return "Take control first.";
+}
+
+export function showOperator({ operator }, up) {
+  const { name, you } = operator;
+  setText(byId("operator-role"), you ? "You drive" : "Watching");
+  setText(byId("operator-who"), you ? `as ${name}` : name ? `${name} drives` : "No one drives");
+  byId("operator-who").title = name ?? "";
+  setHidden(byId("take-control"), you);
+  setHidden(byId("release-control"), !you);
+  byId("take-control").classList.toggle("primary", !name);
+  const offline = up ? "" : "No connection to the server.";
+  setBlocked(byId("take-control"), offline);
+  setBlocked(byId("release-control"), offline);
+  setBlocked(byId("hand-over"), offline || (you ? "" : "Only the one who drives can hand over."));
+}
+
+function remembered() {
+  let name = null;
+  try {
+    name = localStorage.getItem(KEY);
+  } catch {
+    // Storage may be forbidden.
+  }
+  if (name) return name;
+  const fresh = `Operator ${10 + Math.floor(Math.random() * 90)}`;
+  remember(fresh);
+  return fresh;
+}
+
+function remember(name) {
+  try {
+    localStorage.setItem(KEY, name);
+  } catch {
+    // The name then lasts as long as the page.
+  }
+}

@@ -1,0 +1,72 @@
+// Paths: play an experiment or a CSV file, see its progress, stop it.
+
+import { call, ROBOT } from "/assets/api.js";
+import { byId, make, onPress, setBlocked, setData, setText } from "/assets/dom.js";
+import { percent } from "/assets/format.js";
+import { attempt, refuse, tell } from "/assets/notices.js";
+
+const LARGEST_BYTES = 20e6;
+
+export class Paths {
+  constructor() {
+    this.titles = new Map();
+    this.blocked = "";
+    onPress(byId("play"), () => this.#play({ experiment: byId("experiment").value }), refuse);
+    onPress(byId("stop-path"), () => attempt(call("DELETE", `${ROBOT}/path`)), refuse);
+    byId("csv").addEventListener("change", () => this.#playFile(byId("csv").files[0]));
+    this.#startDrop();
+    this.load();
+  }
+
+  /** Fill the list of experiments; tried again when the connection comes back. */
+  async load() {
+    if (this.titles.size > 0) return;
+    let experiments = [];
+    try {
+      experiments = await call("GET", `${ROBOT}/experiments`);
+    } catch {
+      return;
+    }
+    for (const { name, title, duration_s } of experiments) {
+      this.titles.set(name, title);
+      const words = duration_s ? `${title} (${Math.round(duration_s)} s)` : title;
+      byId("experiment").append(make("option", "", words, { value: name }));
+    }
+  }
+
+  async #play(path) {
+    const answer = await attempt(call("POST", `${ROBOT}/path`, path).then(() => true));
+    return answer === true;
+  }
+
+  async #playFile(file) {
+    byId("csv").value = "";
+    if (!file) return;
+    if (this.blocked) return refuse(this.blocked);
+    if (file.size > LARGEST_BYTES) return refuse(`${file.name} is larger than ${LARGEST_BYTES / 1e6} MB.`);
+    if (await this.#play({ csv: await file.text() })) tell(`Playing ${file.name}.`);
+  }
+
+  #startDrop() {
+    // A file dropped beside the target must not replace the page.
+    for (const name of ["dragover", "drop"]) window.addEventListener(name, (event) => event.preventDefault());
+    const drop = byId("drop");
+    drop.addEventListener("dragover", () => setData(drop, "over", "true"));
+    for (const name of ["dragleave", "drop"]) drop.addEventListener(name, () => setData(drop, "over", ""));
+    byId("path-group").addEventListener("drop", (event) => {
+      event.preventDefault();
+      this.#playFile(event.dataTransfer.files[0]);
+    });
+  }
+
+  show({ path, safety }, blocked) {
+    const asleep = safety.state === "ENABLED" ? "" : "Enable the robot first.";
+    const running = path ? "A path is playing. Stop it first." : "";
+    this.blocked = blocked || asleep || running;
+    setBlocked(byId("play"), this.blocked || (this.titles.size ? "" : "No experiments were listed."));
+    setBlocked(byId("stop-path"), blocked || (path ? "" : "No path is playing."));
+    byId("path-progress").value = path ? path.progress : 0;
+    const name = path ? (this.titles.get(path.name) ?? path.name) : "";
+    setText(byId("path-text"), path ? `${name} ${percent(path.progress)}` : "No path");
+  }
+}

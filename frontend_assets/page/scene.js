@@ -1,0 +1,66 @@
+// The scene: viser in an iframe of the same origin, its camera and its colours.
+
+import { byId } from "/assets/dom.js";
+import { isDark, onTheme } from "/assets/theme.js";
+
+const frame = () => byId("scene");
+
+/** Load the scene; `?fixedDpr=` of the page is passed on (a coarser picture for slow machines). */
+export function startScene() {
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  let source = `/viser/?websocket=${encodeURIComponent(`${scheme}://${location.host}/viser`)}&hideViserLogo`;
+  const ratio = new URLSearchParams(location.search).get("fixedDpr");
+  if (ratio !== null) source += `&fixedDpr=${encodeURIComponent(ratio)}`;
+  if (isDark()) source += "&darkMode";
+  frame().src = source;
+  frame().addEventListener("load", followTheme);
+  onTheme(followTheme);
+}
+
+/** The window of the scene, or null while it cannot be reached. */
+export function sceneWindow() {
+  try {
+    const inner = frame().contentWindow;
+    return inner?.document ? inner : null;
+  } catch {
+    return null;
+  }
+}
+
+/**
+ * Orientation of the view in the base frame, as (w, x, y, z): the view's x axis points right, y up,
+ * z toward the person. Null while the scene has no camera.
+ */
+export function viewOrientation() {
+  const mutable = sceneWindow()?.__viserMutable;
+  const camera = mutable?.camera?.quaternion;
+  if (!camera) return null;
+  const root = rootOrientation(mutable);
+  return multiply([root[0], -root[1], -root[2], -root[3]], [camera.w, camera.x, camera.y, camera.z]);
+}
+
+/** The scene's root is turned against three.js's world, whose y axis points up. */
+function rootOrientation(mutable) {
+  const root = mutable.nodeRefFromName?.[""]?.quaternion;
+  if (root) return [root.w, root.x, root.y, root.z];
+  return mutable.nodePoseData?.[""]?.wxyz ?? [0.5, -0.5, 0.5, 0.5];
+}
+
+function multiply([aw, ax, ay, az], [bw, bx, by, bz]) {
+  return [
+    aw * bw - ax * bx - ay * by - az * bz,
+    aw * bx + ax * bw + ay * bz - az * by,
+    aw * by - ax * bz + ay * bw + az * bx,
+    aw * bz + ax * by - ay * bx + az * bw,
+  ];
+}
+
+/** Change the scene's colours in place: loading it again would lose the camera. */
+function followTheme() {
+  const inner = sceneWindow()?.document;
+  if (!inner?.documentElement) return;
+  inner.documentElement.setAttribute("data-mantine-color-scheme", isDark() ? "dark" : "light");
+  let behind = inner.querySelector("canvas");
+  while (behind && !behind.style.backgroundColor) behind = behind.parentElement;
+  if (behind) behind.style.backgroundColor = isDark() ? "#0d1015" : "#ffffff";
+}
