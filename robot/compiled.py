@@ -43,8 +43,3 @@ def compiled(function: _Function) -> _Function:
     """Compile ``function`` on first use, with the cache above and IEEE arithmetic kept exact."""
     return cast(_Function, numba.njit(cache=True, fastmath=False, error_model="numpy")(function))
 
-
-if __name__ == "__main__":
-    from robot.instrument_robot import compile_everything
-
-    compile_everything()

@@ -40,6 +40,16 @@ class Request(IntEnum):
     PAUSE = 3
     RESET = 4
     EMERGENCY_STOP = 5
+    OPERATOR_LOST = 6
+
+
+class Refusal(IntEnum):
+    """Why a leader's wish is not followed although the robot is enabled (``target_refused``)."""
+
+    NONE = 0
+    TARGET_TOO_FAR = 1
+    NOT_ALIGNED = 2
+    HOLD_NOT_PRESSED = 3
 
 
 class LeaderKind(IntEnum):

@@ -1,0 +1,76 @@
+"""What every robot looks like to the control loop: the ``Plant`` interface."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+
+class Actuator(NamedTuple):
+    """One driven axis: its name and the unit of its position."""
+
+    name: str
+    unit: str
+
+
+class PlantSpec(NamedTuple):
+    """What a plant is.
+
+    Attributes:
+        name: short name, shown to people.
+        actuators: in the order of the command: seven joints, four servos.
+        tick_ns: how much plant time one tick takes.
+        simulated: True if the plant owns the clock and knows its own truth.
+    """
+
+    name: str
+    actuators: tuple[Actuator, ...]
+    tick_ns: int
+    simulated: bool
+
+
+class Measurement(NamedTuple):
+    """What the robot's own sensors say. The arrays belong to the plant and change with it.
+
+    Attributes:
+        q: (7,) joint angles, rad.
+        servo: (4,) servo angles, rad.
+        valid: whether every device answered.
+        age_s: age of the oldest value, s.
+    """
+
+    q: np.ndarray
+    servo: np.ndarray
+    valid: bool
+    age_s: float
+
+
+class Plant(Protocol):
+    """A robot, simulated or real. Nothing here blocks."""
+
+    spec: PlantSpec
+
+    def read(self) -> Measurement:
+        """The newest measurement."""
+
+    def write(self, command: np.ndarray) -> None:
+        """Take a (1,) ``robot.records.COMMAND``."""
+
+    def advance(self) -> int:
+        """Let one tick pass; how many nanoseconds it took."""
+
+    def hold(self) -> None:
+        """Stay where it is, under torque."""
+
+    def release(self) -> None:
+        """Let go of torque. A separate act, never a default."""
+
+    def close(self) -> None:
+        """Give the devices back."""
+
+    def truth(self, truth: np.ndarray) -> bool:
+        """Fill tip and shaft of a (1,) ``robot.records.TRUTH``; False if the truth is unknown.
+
+        For reports only, never for control.
+        """

@@ -1,0 +1,109 @@
+"""The configuration as the compiled control path reads it: one read-only numpy record, SI units."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from robot.configuration import Configuration
+
+PARAMETERS = np.dtype(
+    [
+        ("shaft_base", "f8", 3),
+        ("rotation_flange_segment", "f8", (3, 3)),
+        ("shaft_length", "f8"),
+        ("segment_length", "f8"),
+        ("pitch_radius", "f8"),
+        ("pulley_radius", "f8"),
+        ("joint_lower", "f8", 7),
+        ("joint_upper", "f8", 7),
+        ("joint_speed", "f8", 7),
+        ("bend_max", "f8"),
+        ("servo_max", "f8"),
+        ("servo_speed", "f8"),
+        ("lambda_min", "f8"),
+        ("lambda_max", "f8"),
+        ("approach_gain", "f8"),
+        ("jump_position", "f8"),
+        ("jump_angle", "f8"),
+        ("target_distance", "f8"),
+        ("tracking_error", "f8"),
+        ("alignment_tolerance", "f8"),
+        ("speed_max", "f8"),
+        ("speed_min", "f8"),
+        ("position_threshold", "f8"),
+        ("position_ramp", "f8"),
+        ("angular_speed_max", "f8"),
+        ("angular_speed_min", "f8"),
+        ("orientation_threshold", "f8"),
+        ("orientation_ramp", "f8"),
+        ("rcm_gain", "f8"),
+        ("lambda_gain", "f8"),
+        ("posture_gain", "f8"),
+        ("characteristic_length", "f8"),
+    ]
+)
+"""Fields as in ``robot.configuration``, in m, rad, s. ``rotation_flange_segment``: the segment's
+base frame in the flange frame; its z axis is the shaft's direction."""
+
+
+def _module_rotation(configuration: Configuration) -> np.ndarray:
+    z = np.array(configuration.module.shaft_direction)
+    x = np.array(configuration.module.bend_direction)
+    z, x = z / np.linalg.norm(z), x / np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def _degrees(value: float) -> float:
+    return math.radians(value)
+
+
+def parameters(configuration: Configuration) -> np.ndarray:
+    """The (1,) read-only record of ``configuration``.
+
+    Joint limits already hold the margin that is kept from the mechanical stops.
+    """
+    record = np.zeros(1, PARAMETERS)
+    limits, commands = configuration.limits, configuration.commands
+    margin = _degrees(limits.joint_margin_deg)
+    joints = configuration.arm.joints
+    instrument, module = configuration.instrument, configuration.module
+    values: dict[str, object] = {
+        "shaft_base": module.shaft_base_m,
+        "rotation_flange_segment": _module_rotation(configuration),
+        "shaft_length": instrument.shaft_length_m,
+        "segment_length": instrument.segment_length_m,
+        "pitch_radius": instrument.tendon_pitch_radius_m,
+        "pulley_radius": module.pulley_radius_m,
+        "joint_lower": [joint.lower_rad + margin for joint in joints],
+        "joint_upper": [joint.upper_rad - margin for joint in joints],
+        "joint_speed": [min(joint.speed_rad_s, limits.joint_speed_rad_s) for joint in joints],
+        "bend_max": _degrees(limits.bend_deg),
+        "servo_max": _degrees(module.servo_range_deg),
+        "servo_speed": _degrees(module.servo_speed_deg_s),
+        "lambda_min": limits.lambda_min,
+        "lambda_max": limits.lambda_max,
+        "approach_gain": limits.approach_gain,
+        "jump_position": limits.tip_jump_mm * 1e-3,
+        "jump_angle": _degrees(limits.tip_jump_deg),
+        "target_distance": limits.target_distance_mm * 1e-3,
+        "tracking_error": limits.tracking_error_rad,
+        "alignment_tolerance": _degrees(configuration.teleoperation.alignment_tolerance_deg),
+        "speed_max": commands.speed_max_mm_s * 1e-3,
+        "speed_min": commands.speed_min_mm_s * 1e-3,
+        "position_threshold": commands.position_threshold_mm * 1e-3,
+        "position_ramp": commands.position_ramp,
+        "angular_speed_max": _degrees(commands.angular_speed_max_deg_s),
+        "angular_speed_min": _degrees(commands.angular_speed_min_deg_s),
+        "orientation_threshold": _degrees(commands.orientation_threshold_deg),
+        "orientation_ramp": commands.orientation_ramp,
+        "rcm_gain": commands.rcm_gain_per_s,
+        "lambda_gain": configuration.priority.lambda_gain_per_s,
+        "posture_gain": configuration.priority.posture_gain_per_s,
+        "characteristic_length": configuration.priority.characteristic_length_m,
+    }
+    for name, value in values.items():
+        record[name] = value
+    record.flags.writeable = False
+    return record

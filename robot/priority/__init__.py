@@ -1,0 +1,1 @@
+"""Priorities: levels as selections of task rows, limits above them all, and two ways to solve."""

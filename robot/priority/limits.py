@@ -1,0 +1,183 @@
+"""Limits on the rates of x, so that no tick leaves the allowed configurations.
+
+All are linear in the rates: a box, and one row for the bend. They stand above every level.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from robot.compiled import compiled
+
+JOINT_POSITION_BIT = 0
+JOINT_SPEED_BIT = 7
+BEND_BIT = 14
+SERVO_RANGE_BIT = 15
+SERVO_SPEED_BIT = 16
+LAMBDA_LOW_BIT = 17
+LAMBDA_HIGH_BIT = 18
+
+BEND_MARGIN = 5e-5
+"""Kept from the bend limit, rad: a tick along the limit's circle leaves the tangent by up to this."""
+LAMBDA_SPEED = 2.0
+"""Largest rate of lambda, 1/s: with a 230 mm shaft, an insertion of 460 mm/s."""
+_TOUCH = 1e-9
+
+
+@compiled
+def _interval(
+    value: float, lower: float, upper: float, speed: float, gain: float, dt: float
+) -> tuple[float, float]:
+    """Rates that keep ``value`` inside, slowing down before the end; outside, they lead back."""
+    up = min(speed, gain * (upper - value) / dt)
+    down = max(-speed, gain * (lower - value) / dt)
+    return max(min(down, speed), -speed), min(max(up, -speed), speed)
+
+
+@compiled
+def rate_limits(
+    x: np.ndarray,
+    dt: float,
+    parameters: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    bend_row: np.ndarray,
+) -> float:
+    """Bounds on the rates of x.
+
+    Args:
+        x: (10,) commanded configuration.
+        dt: s.
+        parameters: (1,) parameters.
+        lower: (>= 10,) filled with the lower bounds, rad/s and 1/s.
+        upper: (>= 10,) likewise the upper bounds.
+        bend_row: (10,) filled so that ``bend_row @ x_dot <= bound``.
+
+    Returns:
+        The bound of the bend row, rad/s.
+    """
+    p = parameters[0]
+    gain = p.approach_gain
+    for i in range(7):
+        lower[i], upper[i] = _interval(
+            x[i], p.joint_lower[i], p.joint_upper[i], p.joint_speed[i], gain, dt
+        )
+    ratio = p.pulley_radius / p.pitch_radius
+    for i in range(7, 9):
+        lower[i], upper[i] = _interval(
+            x[i], -ratio * p.servo_max, ratio * p.servo_max, ratio * p.servo_speed, gain, dt
+        )
+    lower[9], upper[9] = _interval(x[9], p.lambda_min, p.lambda_max, LAMBDA_SPEED, gain, dt)
+    phi = math.hypot(x[7], x[8])
+    for i in range(10):
+        bend_row[i] = 0.0
+    bend_row[7] = x[7] / phi if phi > 1e-9 else 1.0
+    bend_row[8] = x[8] / phi if phi > 1e-9 else 0.0
+    return gain * (p.bend_max - BEND_MARGIN - phi) / dt
+
+
+@compiled
+def active_limits(
+    x: np.ndarray,
+    x_dot: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    bend_row: np.ndarray,
+    bend_bound: float,
+    parameters: np.ndarray,
+) -> int:
+    """Bits of the limits that hold the motion back this tick (see the ``*_BIT`` constants)."""
+    p = parameters[0]
+    bits = 0
+    ratio = p.pulley_radius / p.pitch_radius
+    for i in range(10):
+        touched = x_dot[i] >= upper[i] - _TOUCH or x_dot[i] <= lower[i] + _TOUCH
+        if not touched:
+            continue
+        bound = upper[i] if x_dot[i] >= upper[i] - _TOUCH else -lower[i]
+        if i < 7:
+            at_speed = bound >= p.joint_speed[i] - _TOUCH
+            bits |= 1 << ((JOINT_SPEED_BIT if at_speed else JOINT_POSITION_BIT) + i)
+        elif i < 9:
+            at_speed = bound >= ratio * p.servo_speed - _TOUCH
+            bits |= 1 << (SERVO_SPEED_BIT if at_speed else SERVO_RANGE_BIT)
+        else:
+            bits |= 1 << (LAMBDA_HIGH_BIT if x_dot[i] >= upper[i] - _TOUCH else LAMBDA_LOW_BIT)
+    if bend_row[7] * x_dot[7] + bend_row[8] * x_dot[8] >= bend_bound - _TOUCH:
+        bits |= 1 << BEND_BIT
+    return bits
+
+
+@compiled
+def violations(x: np.ndarray, parameters: np.ndarray) -> int:
+    """How many position limits (joints, bend, servo range, lambda) configuration ``x`` breaks."""
+    p = parameters[0]
+    count = 0
+    for i in range(7):
+        if not p.joint_lower[i] - 1e-12 <= x[i] <= p.joint_upper[i] + 1e-12:
+            count += 1
+    if not math.hypot(x[7], x[8]) <= p.bend_max + 1e-12:
+        count += 1
+    reach = p.servo_max * p.pulley_radius / p.pitch_radius + 1e-12
+    if not (abs(x[7]) <= reach and abs(x[8]) <= reach):
+        count += 1
+    if not p.lambda_min - 1e-12 <= x[9] <= p.lambda_max + 1e-12:
+        count += 1
+    return count
+
+
+@compiled
+def share_within(
+    x_dot: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    bend_row: np.ndarray,
+    bend_bound: float,
+) -> float:
+    """Largest s in [0, 1] for which ``s * x_dot`` keeps every limit.
+
+    The closed forms know no limits. Scaling the whole motion keeps its direction and so the RCM,
+    which clipping single rates would break.
+    """
+    share = 1.0
+    for i in range(10):
+        if x_dot[i] > upper[i]:
+            share = min(share, max(upper[i], 0.0) / x_dot[i])
+        elif x_dot[i] < lower[i]:
+            share = min(share, min(lower[i], 0.0) / x_dot[i])
+    bend_rate = bend_row[7] * x_dot[7] + bend_row[8] * x_dot[8]
+    if bend_rate > bend_bound:
+        share = min(share, max(bend_bound, 0.0) / bend_rate)
+    return share
+
+
+def describe(bits: int, x: np.ndarray, parameters: np.ndarray) -> list[str]:
+    """The active limits in words, for people.
+
+    Args:
+        bits: as :func:`active_limits` returns them.
+        x: (10,) configuration at the time.
+        parameters: (1,) parameters.
+    """
+    p = parameters[0]
+    words = []
+    for i in range(7):
+        if bits >> (JOINT_POSITION_BIT + i) & 1:
+            middle = 0.5 * (p["joint_lower"][i] + p["joint_upper"][i])
+            end = "upper" if x[i] > middle else "lower"
+            words.append(f"joint {i + 1} at its {end} limit ({math.degrees(x[i]):.1f} deg)")
+        if bits >> (JOINT_SPEED_BIT + i) & 1:
+            words.append(f"joint {i + 1} at its speed limit")
+    if bits >> BEND_BIT & 1:
+        words.append(f"bend limit {math.degrees(p['bend_max']):.0f} deg")
+    if bits >> SERVO_RANGE_BIT & 1:
+        words.append("servo range limit")
+    if bits >> SERVO_SPEED_BIT & 1:
+        words.append("servo speed limit")
+    if bits >> LAMBDA_LOW_BIT & 1:
+        words.append("shaft fully inserted (lambda at its lower limit)")
+    if bits >> LAMBDA_HIGH_BIT & 1:
+        words.append("shaft fully withdrawn to the trocar (lambda at its upper limit)")
+    return words

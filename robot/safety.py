@@ -1,0 +1,221 @@
+"""The safety states: one printed table of transitions, applied at the start of every tick.
+
+It fails closed: what the table does not list is refused and changes nothing; leaving FAULT takes an
+explicit RESET and leads to DISABLED, never to motion.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from robot.compiled import compiled
+from robot.errors import KeyholeError
+from robot.records import Request, Safety
+from robot.tendons import bend_from_servos
+
+
+class Event(IntEnum):
+    """What can happen to the safety state; the first seven are requests."""
+
+    NOTHING = 0
+    ENABLE = 1
+    DISABLE = 2
+    PAUSE = 3
+    RESET = 4
+    EMERGENCY_STOP = 5
+    OPERATOR_LOST = 6
+    LEADER_STALE = 7
+    LEADER_JUMP = 8
+    LEADER_INVALID = 9
+    MEASUREMENT_LOST = 10
+    TRACKING_ERROR = 11
+    SOLVER_FAILED = 12
+    CONTROL_FAILED = 13
+
+
+class Transition(NamedTuple):
+    """One row of the table: in ``state``, ``event`` leads to ``next``."""
+
+    state: Safety
+    event: Event
+    next: Safety
+
+
+_D, _E, _P, _F = Safety.DISABLED, Safety.ENABLED, Safety.PAUSED, Safety.FAULT
+
+TRANSITIONS: tuple[Transition, ...] = (
+    Transition(_D, Event.ENABLE, _E),
+    Transition(_E, Event.ENABLE, _E),
+    Transition(_P, Event.ENABLE, _E),
+    Transition(_D, Event.DISABLE, _D),
+    Transition(_E, Event.DISABLE, _D),
+    Transition(_P, Event.DISABLE, _D),
+    Transition(_E, Event.PAUSE, _P),
+    Transition(_P, Event.PAUSE, _P),
+    Transition(_F, Event.RESET, _D),
+    Transition(_D, Event.EMERGENCY_STOP, _F),
+    Transition(_E, Event.EMERGENCY_STOP, _F),
+    Transition(_P, Event.EMERGENCY_STOP, _F),
+    Transition(_F, Event.EMERGENCY_STOP, _F),
+    Transition(_E, Event.OPERATOR_LOST, _P),
+    Transition(_E, Event.LEADER_STALE, _P),
+    Transition(_E, Event.LEADER_JUMP, _P),
+    Transition(_E, Event.LEADER_INVALID, _P),
+    Transition(_E, Event.MEASUREMENT_LOST, _F),
+    Transition(_P, Event.MEASUREMENT_LOST, _F),
+    Transition(_E, Event.TRACKING_ERROR, _F),
+    Transition(_P, Event.TRACKING_ERROR, _F),
+    Transition(_E, Event.SOLVER_FAILED, _F),
+    Transition(_D, Event.CONTROL_FAILED, _F),
+    Transition(_E, Event.CONTROL_FAILED, _F),
+    Transition(_P, Event.CONTROL_FAILED, _F),
+    Transition(_F, Event.CONTROL_FAILED, _F),
+)
+"""Every transition there is. An event that is not listed for a state leaves the state as it is; if
+it was an operator's request, it is refused."""
+
+REASONS: dict[Event, tuple[str, str]] = {
+    Event.NOTHING: ("started", "take control, then enable"),
+    Event.ENABLE: ("ready", ""),
+    Event.DISABLE: ("disabled by the operator", "enable to drive"),
+    Event.PAUSE: ("paused by the operator", "enable to go on"),
+    Event.RESET: ("reset after a fault", "enable to drive"),
+    Event.EMERGENCY_STOP: ("emergency stop", "make sure it is safe, then reset"),
+    Event.OPERATOR_LOST: ("the operator's connection was lost", "take control, then enable"),
+    Event.LEADER_STALE: ("the leader went silent while driving", "check the device, then enable"),
+    Event.LEADER_JUMP: ("the leader jumped; the sample was refused", "enable and engage again"),
+    Event.LEADER_INVALID: ("the leader sent an invalid pose", "check the device, then enable"),
+    Event.MEASUREMENT_LOST: ("measurements from the robot stopped", "check the robot, then reset"),
+    Event.TRACKING_ERROR: (
+        "the robot does not follow its commands",
+        "look for contact or a blocked axis, then reset",
+    ),
+    Event.SOLVER_FAILED: ("no motion satisfies the limits", "reset; move away from the limit"),
+    Event.CONTROL_FAILED: ("the control loop failed", "read the log, then reset"),
+}
+"""For each event that led into the present state: why, and what to do."""
+
+REFUSALS: dict[tuple[Safety, Event], str] = {
+    (_F, Event.ENABLE): "the robot is in FAULT: remove the cause, reset, then enable",
+    (_F, Event.DISABLE): "the robot is in FAULT and holds already: reset to leave it",
+    (_F, Event.PAUSE): "the robot is in FAULT and holds already: reset to leave it",
+    (_D, Event.PAUSE): "the robot is disabled; there is no motion to pause",
+    (_D, Event.RESET): "there is no fault to reset",
+    (_E, Event.RESET): "there is no fault to reset",
+    (_P, Event.RESET): "there is no fault to reset",
+}
+"""Why a request that the table does not list is refused."""
+
+
+class RequestRefused(KeyholeError):
+    """The transition table does not allow what was asked.
+
+    Attributes:
+        state: the safety state at the time.
+        request: what was asked.
+    """
+
+    code = "request_refused"
+
+    def __init__(self, state: Safety, request: Request) -> None:
+        super().__init__(REFUSALS.get((state, Event(request)), f"not possible in {state.name}"))
+        self.state, self.request = state, request
+
+
+def successor(state: Safety, event: Event) -> Safety | None:
+    """The state that ``event`` leads to, or None where the table has no such row."""
+    found = int(_TABLE[event, state])
+    return None if found < 0 else Safety(found)
+
+
+def check_request(state: Safety, request: Request) -> None:
+    """Raise :class:`RequestRefused` unless ``request`` is in the table for ``state``."""
+    if successor(state, Event(request)) is None:
+        raise RequestRefused(state, request)
+
+
+def printed_table() -> str:
+    """The transition table as text, a row a state and event."""
+    rows = [f"{'state':<10} {'event':<18} {'next':<10} reason"]
+    for row in TRANSITIONS:
+        reason = REASONS[row.event][0]
+        rows.append(f"{row.state.name:<10} {row.event.name:<18} {row.next.name:<10} {reason}")
+    return "\n".join(rows)
+
+
+def _table() -> np.ndarray:
+    table = np.full((len(Event), len(Safety)), -1, dtype=np.int64)
+    for row in TRANSITIONS:
+        table[row.event, row.state] = row.next
+    return table
+
+
+_TABLE = _table()
+_DISABLED, _ENABLED = int(_D), int(_E)
+_ENABLE = int(Event.ENABLE)
+_STALE, _LOST, _TRACKING = (
+    int(Event.LEADER_STALE),
+    int(Event.MEASUREMENT_LOST),
+    int(Event.TRACKING_ERROR),
+)
+MEASUREMENT_TIMEOUT_S = 0.05
+
+
+@compiled
+def apply_event(state: np.ndarray, event: int) -> bool:
+    """Let ``event`` act on the (1,) state record; True if the table has the row."""
+    s = state[0].state
+    following = _TABLE[event, s.safety]
+    if following < 0:
+        return False
+    s.safety = following
+    s.reason = event
+    return True
+
+
+@compiled
+def tracking_distance(x: np.ndarray, measured_q: np.ndarray) -> float:
+    """Largest distance in rad between commanded and measured joint angles."""
+    largest = 0.0
+    for i in range(7):
+        largest = max(largest, abs(x[i] - measured_q[i]))
+    return largest
+
+
+@compiled
+def decide(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) -> bool:
+    """Apply this tick's request and what the measurement tells to the state in ``outcome``.
+
+    Args:
+        outcome: (1,) record whose ``state`` is changed.
+        tick_input: (1,) input record.
+        parameters: (1,) parameters.
+
+    Returns:
+        Whether the robot has just been enabled and takes the measured joints as its own; such a
+        tick does not move.
+    """
+    s = outcome[0].state
+    i = tick_input[0]
+    p = parameters[0]
+    before = s.safety
+    if i.request != 0:
+        apply_event(outcome, i.request)
+    if i.measured_valid == 0 or not i.measured_age_s <= MEASUREMENT_TIMEOUT_S:
+        apply_event(outcome, _LOST)
+        return False
+    if before == _DISABLED and s.safety == _ENABLED:
+        for k in range(7):
+            s.x[k] = i.measured_q[k]
+        u, v = bend_from_servos(i.measured_servo, p.pitch_radius, p.pulley_radius)
+        s.x[7] = u
+        s.x[8] = v
+        return True
+    if not tracking_distance(s.x, i.measured_q) <= p.tracking_error:
+        apply_event(outcome, _TRACKING)
+    if s.safety == _ENABLED and s.engaged != 0 and not i.leader.age_s <= i.leader.timeout_s:
+        apply_event(outcome, _STALE)
+    return False

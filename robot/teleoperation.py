@@ -1,0 +1,257 @@
+"""From the leader's motion to the desired tip pose. Paper 1, eqs. (88)-(91), as one must read them.
+
+With the full transform of (90), turning the stylus would move the tip by (I - R) t, t being the
+distance between stylus and tip. So the similarity of (89) uses the rotation part of (90) only, the
+translation is anchored, and the motion scale acts on the translation only:
+
+    p_desired = p_tip_anchor + scale * R_bl (p_leader - p_leader_anchor)
+    R_desired = R_bl (R_leader R_leader_anchor^T) R_bl^T R_tip_anchor
+
+with R_bl turning leader motion into the base frame. At the moment of engagement both are the tip's
+own pose, so closing the clutch never moves anything. The desired pose then runs toward this target
+no faster than the speed limits.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from robot.compiled import compiled
+from robot.records import Alignment, LeaderKind, Refusal, Safety
+from robot.rotations import (
+    angle_between,
+    apply,
+    exponential,
+    matrix_from_quaternion,
+    multiply,
+    multiply_transposed,
+    orthonormalize,
+)
+from robot.commands import rotation_error
+from robot.safety import Event, apply_event
+
+_ENABLED = int(Safety.ENABLED)
+_MATCHED = int(Alignment.MATCHED)
+_JUMP, _INVALID = int(Event.LEADER_JUMP), int(Event.LEADER_INVALID)
+_PATH = int(LeaderKind.PATH)
+_TOO_FAR, _NOT_ALIGNED, _NO_HOLD = (
+    int(Refusal.TARGET_TOO_FAR),
+    int(Refusal.NOT_ALIGNED),
+    int(Refusal.HOLD_NOT_PRESSED),
+)
+
+
+@compiled
+def _distance(a: np.ndarray, b: np.ndarray) -> float:
+    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
+
+
+@compiled
+def _valid(leader: np.ndarray) -> bool:
+    norm = 0.0
+    for k in range(4):
+        norm += leader.wxyz[k] * leader.wxyz[k]
+    total = norm
+    for k in range(3):
+        total += abs(leader.position[k])
+    return math.isfinite(total) and norm > 1e-6
+
+
+@compiled
+def _settings_changed(s: np.ndarray, settings: np.ndarray) -> bool:
+    if s.anchor_scale != settings.motion_scale:
+        return True
+    if s.anchor_lock_rotation != settings.lock_rotation:
+        return True
+    if s.anchor_lock_translation != settings.lock_translation:
+        return True
+    for i in range(3):
+        for j in range(3):
+            if s.anchor_rotation_base_leader[i, j] != settings.rotation_base_leader[i, j]:
+                return True
+    return False
+
+
+@compiled
+def _anchor(s: np.ndarray, settings: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> None:
+    """Take the leader's pose and the desired pose as the pair that belongs together."""
+    for i in range(3):
+        s.anchor_leader_position[i] = position[i]
+        s.anchor_tip_position[i] = s.desired_position[i]
+        for j in range(3):
+            s.anchor_leader_rotation[i, j] = rotation[i, j]
+            s.anchor_tip_rotation[i, j] = s.desired_rotation[i, j]
+            s.anchor_rotation_base_leader[i, j] = settings.rotation_base_leader[i, j]
+    s.anchor_scale = settings.motion_scale
+    s.anchor_lock_rotation = settings.lock_rotation
+    s.anchor_lock_translation = settings.lock_translation
+
+
+@compiled
+def relative_target(
+    s: np.ndarray,
+    position: np.ndarray,
+    rotation: np.ndarray,
+    target_position: np.ndarray,
+    target_rotation: np.ndarray,
+) -> None:
+    """Target pose of a clutched leader from the anchors in the state ``s``; eqs. (88)-(91)."""
+    moved = np.empty(3)
+    turned = np.empty(3)
+    first = np.empty((3, 3))
+    second = np.empty((3, 3))
+    for i in range(3):
+        moved[i] = s.anchor_scale * (position[i] - s.anchor_leader_position[i])
+    apply(s.anchor_rotation_base_leader, moved, turned)
+    for i in range(3):
+        target_position[i] = s.anchor_tip_position[i] + turned[i]
+    multiply_transposed(rotation, s.anchor_leader_rotation, first)
+    multiply(s.anchor_rotation_base_leader, first, second)
+    multiply_transposed(second, s.anchor_rotation_base_leader, first)
+    multiply(first, s.anchor_tip_rotation, target_rotation)
+
+
+@compiled
+def approach(
+    s: np.ndarray,
+    target_position: np.ndarray,
+    target_rotation: np.ndarray,
+    dt: float,
+    smoothing_s: float,
+    speed: float,
+    angular_speed: float,
+) -> None:
+    """Move the desired pose toward the target: smoothed over ``smoothing_s``, limited in speed."""
+    share = 1.0 if smoothing_s <= 0.0 else 1.0 - math.exp(-dt / smoothing_s)
+    distance = share * _distance(target_position, s.desired_position)
+    scale = share if distance <= speed * dt else share * speed * dt / distance
+    if scale == 1.0:
+        for i in range(3):
+            s.desired_position[i] = target_position[i]
+    else:
+        for i in range(3):
+            s.desired_position[i] += scale * (target_position[i] - s.desired_position[i])
+    vector = np.empty(3)
+    angle = share * rotation_error(target_rotation, s.desired_rotation, vector)
+    scale = share if angle <= angular_speed * dt else share * angular_speed * dt / angle
+    if scale == 1.0:
+        for i in range(3):
+            for j in range(3):
+                s.desired_rotation[i, j] = target_rotation[i, j]
+    elif angle > 0.0:
+        step = np.empty((3, 3))
+        turned = np.empty((3, 3))
+        for i in range(3):
+            vector[i] *= scale
+        exponential(vector, step)
+        multiply(step, s.desired_rotation, turned)
+        orthonormalize(turned)
+        for i in range(3):
+            for j in range(3):
+                s.desired_rotation[i, j] = turned[i, j]
+
+
+@compiled
+def release(s: np.ndarray) -> None:
+    """Open the clutch: the desired pose is the commanded tip, nothing is left to chase."""
+    s.engaged = 0
+    s.leader_kind = 0
+    for i in range(3):
+        s.desired_position[i] = s.tip_position[i]
+        for j in range(3):
+            s.desired_rotation[i, j] = s.tip_rotation[i, j]
+
+
+@compiled
+def _may_engage(outcome: np.ndarray, leader: np.ndarray, settings: np.ndarray, p: np.ndarray,
+                rotation: np.ndarray) -> bool:
+    s = outcome[0].state
+    if leader.absolute != 0:
+        if leader.kind != _PATH and _distance(leader.position, s.tip_position) > p.target_distance:
+            outcome[0].report.target_refused = _TOO_FAR
+            return False
+        return True
+    if settings.alignment == _MATCHED:
+        in_base = np.empty((3, 3))
+        multiply(settings.rotation_base_leader, rotation, in_base)
+        if angle_between(in_base, s.tip_rotation) > p.alignment_tolerance:
+            outcome[0].report.target_refused = _NOT_ALIGNED
+            return False
+    return True
+
+
+@compiled
+def follow(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) -> bool:
+    """Update engagement and the desired pose in ``outcome``'s state.
+
+    Args:
+        outcome: (1,) record whose ``state`` is changed.
+        tick_input: (1,) input record.
+        parameters: (1,) parameters.
+
+    Returns:
+        Whether a leader is engaged, that is, whether the tip shall move.
+    """
+    s = outcome[0].state
+    leader = tick_input[0].leader
+    settings = tick_input[0].settings
+    p = parameters[0]
+    held = settings.hold_to_move == 0 or tick_input[0].hold != 0
+    if not held and leader.clutch != 0 and s.safety == _ENABLED:
+        outcome[0].report.target_refused = _NO_HOLD
+    if s.safety != _ENABLED or not held or leader.kind == 0 or leader.clutch == 0:
+        release(s)
+        return False
+    if not _valid(leader):
+        apply_event(outcome, _INVALID)
+        release(s)
+        return False
+    rotation = np.empty((3, 3))
+    matrix_from_quaternion(leader.wxyz, rotation)
+    if s.engaged == 0 or s.leader_kind != leader.kind:
+        release(s)
+        if leader.age_s > leader.timeout_s or not _may_engage(
+            outcome, leader, settings, p, rotation
+        ):
+            return False
+        s.engaged = 1
+        s.leader_kind = leader.kind
+        _anchor(s, settings, leader.position, rotation)
+    elif leader.absolute == 0 and leader.sequence != s.leader_sequence:
+        if (
+            _distance(leader.position, s.leader_position) > p.jump_position
+            or angle_between(rotation, s.leader_rotation) > p.jump_angle
+        ):
+            apply_event(outcome, _JUMP)
+            release(s)
+            return False
+    if _settings_changed(s, settings):
+        _anchor(s, settings, leader.position, rotation)
+    s.leader_sequence = leader.sequence
+    for i in range(3):
+        s.leader_position[i] = leader.position[i]
+        for j in range(3):
+            s.leader_rotation[i, j] = rotation[i, j]
+    target_position = np.empty(3)
+    target_rotation = np.empty((3, 3))
+    if leader.absolute != 0:
+        target_position[:] = leader.position
+        target_rotation[:] = rotation
+    else:
+        relative_target(s, leader.position, rotation, target_position, target_rotation)
+    if settings.lock_translation != 0:
+        target_position[:] = s.anchor_tip_position
+    if settings.lock_rotation != 0:
+        target_rotation[:] = s.anchor_tip_rotation
+    approach(
+        s,
+        target_position,
+        target_rotation,
+        tick_input[0].dt_s,
+        leader.smoothing_s,
+        p.speed_max,
+        p.angular_speed_max,
+    )
+    return True

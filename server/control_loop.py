@@ -1,0 +1,207 @@
+"""One tick of the whole: read, decide, write, advance, and the record of it all.
+
+The same object runs in the control process and headless; what differs is who calls ``step``.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from hardware.plant import Plant
+from robot.configuration import Configuration
+from robot.forward import ForwardKinematics, measure_errors
+from robot.instrument_robot import InstrumentRobot
+from robot.priority.levels import case_named
+from robot.records import (
+    LEADER,
+    RECORD,
+    SCHEMA_VERSION,
+    SETTINGS,
+    Alignment,
+    Coordinates,
+    ErrorSource,
+    LeaderKind,
+    Request,
+    Solver,
+)
+from robot.rotations import matrix_from_quaternion, multiply, quaternion_from_matrix
+from robot.tendons import bend_from_servos
+from robot.urdf import urdf_text
+from scenes.path import Path
+
+SOLVER_NAMES = {
+    "hqp": Solver.HQP,
+    "closed-form": Solver.CLOSED_FORM,
+    "augmented": Solver.AUGMENTED,
+}
+COORDINATE_NAMES = {"uv": Coordinates.UV, "polar": Coordinates.POLAR}
+ALIGNMENT_NAMES = {"relative": Alignment.RELATIVE, "matched": Alignment.MATCHED}
+
+
+def default_settings(configuration: Configuration) -> np.ndarray:
+    """The (1,) operator settings that the configuration starts with."""
+    settings = np.zeros(1, SETTINGS)
+    priority, teleoperation = configuration.priority, configuration.teleoperation
+    settings["case"] = case_named(priority.case)
+    settings["solver"] = SOLVER_NAMES[priority.solver]
+    settings["coordinates"] = COORDINATE_NAMES[priority.coordinates]
+    settings["feed_forward"] = configuration.commands.feed_forward
+    settings["alignment"] = ALIGNMENT_NAMES[teleoperation.alignment]
+    settings["hold_to_move"] = teleoperation.hold_to_move
+    settings["motion_scale"] = teleoperation.motion_scale
+    settings["lambda_reference"] = priority.lambda_reference
+    settings["rotation_base_leader"] = np.eye(3)
+    return settings
+
+
+class ControlLoop:
+    """The robot, its plant, and what reaches them from outside.
+
+    Attributes:
+        record: (1,) ``RECORD`` of the last step; its memory is reused by every step.
+        settings: (1,) ``SETTINGS`` in force from the next step on.
+        leader: (1,) ``LEADER``: the active leader's newest sample.
+        request: a ``Request`` for the next step; consumed by it.
+        hold: 1 while the hold-to-move key is down.
+        trocar_position: (3,) m, base frame. trocar_velocity: (3,) m/s.
+    """
+
+    def __init__(self, robot: InstrumentRobot, plant: Plant, configuration: Configuration) -> None:
+        self.robot, self.plant = robot, plant
+        self.record = np.zeros(1, RECORD)
+        self.settings = default_settings(configuration)
+        self.leader = np.zeros(1, LEADER)
+        self.request: int = Request.NONE
+        self.hold = 0
+        self.trocar_position = np.array(configuration.trocar.position_m)
+        self.trocar_velocity = np.zeros(3)
+        self._state = robot.initial_state()
+        self._forward = ForwardKinematics(urdf_text(configuration), robot.parameters)
+        self._path: Path | None = None
+        self._path_time_ns = 0
+        self._path_start_position = np.zeros(3)
+        self._path_start_rotation = np.zeros((3, 3))
+        self._path_sample = np.zeros(7)
+        self._dt_ns = plant.spec.tick_ns
+        self._views()
+        header = self._header
+        header["schema_version"] = SCHEMA_VERSION
+        header["robot"] = robot.name.encode()
+        header["configuration_hash"] = configuration.hash64()
+
+    def _views(self) -> None:
+        """Views into the record, made once: making one costs as much as the kinematics."""
+        record = self.record
+        self._header = record["header"][0]
+        self._input = record["input"]
+        self._outcome = record["outcome"]
+        self._command = self._outcome["command"]
+        self._truth = record["truth"]
+        self._in = self._input[0]
+        self._in_leader = self._in["leader"]
+        self._measured_q = self._in["measured_q"]
+        self._measured_servo = self._in["measured_servo"]
+        self._next_state = self._outcome["state"]
+        self._desired_position = self._outcome["report"]["desired_position"][0]
+        self._desired_wxyz = self._outcome["report"]["desired_wxyz"][0]
+        self._leader_position = self._in["leader"]["position"]
+        self._leader_wxyz = self._in["leader"]["wxyz"]
+        self._in["trocar_position"][:] = self.trocar_position
+
+    @property
+    def path(self) -> Path | None:
+        """The path that is playing."""
+        return self._path
+
+    def start_path(self, path: Path, path_id: int = 0) -> None:
+        """Play ``path`` from where the commanded tip is now; it excludes every other leader."""
+        self._path, self._path_time_ns = path, 0
+        self._path_start_position[:] = self._state["tip_position"][0]
+        self._path_start_rotation[:] = self._state["tip_rotation"][0]
+        self._header["path_id"] = path_id
+        self._header["path_progress"] = 0.0
+
+    def stop_path(self) -> None:
+        """Stop playing; the tip stays where it is."""
+        self._path = None
+        self._header["path_id"] = 0
+        self._header["path_progress"] = 0.0
+
+    def _path_leader(self, path: Path) -> None:
+        """Write the path's target at the end of the coming tick as the leader's sample."""
+        time_s = self._path_time_ns * 1e-9
+        sample, leader = self._path_sample, self._in_leader
+        path.at(time_s, sample)
+        leader["kind"] = LeaderKind.PATH
+        leader["clutch"] = 1
+        leader["absolute"] = 1
+        leader["age_s"] = 0.0
+        leader["timeout_s"] = 1.0
+        leader["smoothing_s"] = 0.0
+        leader["sequence"] += 1
+        np.add(self._path_start_position, sample[:3], out=self._leader_position)
+        turn, turned = np.empty((3, 3)), np.empty((3, 3))
+        matrix_from_quaternion(sample[3:], turn)
+        multiply(turn, self._path_start_rotation, turned)
+        quaternion_from_matrix(turned, self._leader_wxyz)
+        self._header["path_progress"] = min(1.0, time_s / path.duration_s)
+
+    def _advance_path(self) -> None:
+        path, state = self._path, self._state
+        if path is None:
+            return
+        if self._path_time_ns >= round(path.duration_s * 1e9):
+            self.stop_path()
+        elif state["engaged"][0]:
+            self._path_time_ns += self._dt_ns
+
+    def _read(self) -> None:
+        measurement = self.plant.read()
+        tick_input = self._in
+        self._measured_q[:] = measurement.q
+        self._measured_servo[:] = measurement.servo
+        tick_input["measured_valid"] = measurement.valid
+        tick_input["measured_age_s"] = measurement.age_s
+        tick_input["dt_s"] = self._dt_ns * 1e-9
+        tick_input["request"] = self.request
+        tick_input["hold"] = self.hold
+        tick_input["trocar_position"] = self.trocar_position
+        tick_input["trocar_velocity"] = self.trocar_velocity
+        tick_input["settings"] = self.settings[0]
+        if self._path is not None:
+            self._path_leader(self._path)
+        else:
+            tick_input["leader"] = self.leader[0]
+        self.request = Request.NONE
+
+    def _measure(self) -> None:
+        truth = self._truth
+        source = ErrorSource.TRUE
+        if not self.plant.truth(truth):
+            source = ErrorSource.MEASURED
+            measurement = self.plant.read()
+            p = self.robot.parameters[0]
+            u, v = bend_from_servos(measurement.servo, p["pitch_radius"], p["pulley_radius"])
+            self._forward.fill(truth, measurement.q, u, v)
+        truth["source"] = source
+        measure_errors(
+            truth, self._desired_position, self._desired_wxyz, self._in["trocar_position"]
+        )
+
+    def step(self) -> None:
+        """Read, tick, write, advance, measure; ``record`` then tells everything about it."""
+        started = time.perf_counter_ns()
+        self._read()
+        self.robot.tick(self._state, self._input, self._outcome)
+        header = self._header
+        header["tick_ns"] = time.perf_counter_ns() - started
+        self.plant.write(self._command)
+        self._dt_ns = self.plant.advance()
+        self._measure()
+        self._state[:] = self._next_state
+        header["tick"] = self._state["tick"][0]
+        header["dt_ns"] = self._dt_ns
+        header["time_ns"] += self._dt_ns
+        self._advance_path()
