@@ -60,10 +60,11 @@ def install() -> str | None:
 
 def advice() -> str:
     """One line that tells a person how to get a browser."""
-    command = "apt-get install chromium" if shutil.which("apt-get") else "playwright install"
-    sudo = "" if os.geteuid() == 0 else "sudo "
+    command = ".venv/bin/playwright install chromium"
+    if shutil.which("apt-get"):
+        command = f"{'' if os.geteuid() == 0 else 'sudo '}apt-get install chromium"
     return (
-        f"no Chromium that starts was found; install one with: {sudo}{command}"
+        f"no Chromium that starts was found; install one with: {command}"
         " (or name one with KEYHOLE_CHROMIUM=/path/to/chromium)"
     )
 
