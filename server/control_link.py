@@ -108,7 +108,7 @@ class ControlLink:
         self.leader = np.zeros(1, dtype=LEADER)
         self.leader["wxyz"][0, 0] = 1.0
         self._leader_bytes = self.leader.view(np.uint8)
-        self._leader_age = self.leader["age_s"]
+        self._leader_age, self._leader_clutch = self.leader["age_s"], self.leader["clutch"]
 
     def poll(self, now_ns: int) -> None:
         """Read what is new and set the attributes for the tick that follows."""
@@ -183,20 +183,27 @@ class ControlLink:
         self.hold = int(pressed and not lost)
 
     def _poll_leaders(self, now_ns: int) -> None:
-        before = self._choice.active
+        choice = self._choice
+        before = choice.active
         for place, inbox in enumerate(self._leaders):
             if inbox.update():
-                self._choice.update(place, inbox.closed, inbox.sequence)
+                choice.update(place, inbox.closed, inbox.sequence)
             elif inbox.closed and now_ns - inbox.stamp_ns > inbox.patience_ns:
-                inbox.open()
-                self._choice.update(place, False, inbox.sequence)
-        active = self._choice.active
-        if active == NOBODY:
+                inbox.closed = False
+                choice.update(place, False, inbox.sequence)
+        if choice.active == NOBODY:
             return
-        inbox = self._leaders[active]
-        if inbox.changed or active != before:
+        inbox = self._leaders[choice.active]
+        if inbox.changed or choice.active != before:
             self._leader_bytes[:] = inbox.leader_bytes
+        if not choice.engaged:
+            self._leader_clutch[0] = 0
         self._leader_age[0] = max(0, now_ns - inbox.stamp_ns) * 1e-9
+
+    def release_leaders(self) -> None:
+        """Let no leader lead until its clutch closes anew (a target: until a new one comes)."""
+        self._choice.release()
+        self._leader_clutch[0] = 0
 
     def publish(self, record: NDArray[Any]) -> None:
         """Publish a (1,) RECORD as the newest and into the ring."""
@@ -258,11 +265,6 @@ class _LeaderInbox(_Inbox):
         self.closed, self.sequence = bool(leader["clutch"]), int(leader["sequence"])
         self.patience_ns = max(float(LEADER_GONE_NS), 1e10 * float(leader["timeout_s"]))
         return True
-
-    def open(self) -> None:
-        """Take the clutch for open although nobody said so."""
-        self.closed, self.changed = False, True
-        self.record["leader"]["clutch"] = 0
 
     @property
     def leader_bytes(self) -> NDArray[np.uint8]:

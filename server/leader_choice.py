@@ -12,11 +12,15 @@ class LeaderChoice:
 
     A leader that is left out does not become active by waiting: its clutch must open and close
     again, so that nobody takes over without having acted. The standing target of the API is the
-    exception on both sides: it yields to any leader whose clutch closes, and comes back only
-    with a new target.
+    exception on both sides: it yields to any leader whose clutch closes, and engages only with a
+    new target.
 
     Args:
         kinds: the kind of each leader; its place here names it in :meth:`update`.
+
+    Attributes:
+        active: place of the leader that is active, or was last; NOBODY before the first.
+        engaged: whether the active leader leads.
     """
 
     def __init__(self, kinds: tuple[LeaderKind, ...]) -> None:
@@ -24,7 +28,7 @@ class LeaderChoice:
         self._closed = [False] * len(kinds)
         self._sequences: list[int | None] = [None] * len(kinds)
         self.active = NOBODY
-        """Place of the leader that is active, or was last; -1 before the first."""
+        self.engaged = False
 
     def update(self, place: int, closed: bool, sequence: int) -> None:
         """Take a new sample of the leader at ``place``: its clutch and its sequence number."""
@@ -32,14 +36,12 @@ class LeaderChoice:
         closes = sequence != known if self._is_target[place] else not self._closed[place]
         self._closed[place] = closed
         self._sequences[place] = sequence if closed else None
-        if not (closed and closes):
-            return
-        if self.busy and self._is_target[self.active]:
-            self._closed[self.active] = False
-        if not self.busy:
-            self.active = place
+        if place == self.active and not closed:
+            self.engaged = False
+        yields = not self.engaged or self._is_target[self.active]
+        if closed and closes and yields:
+            self.active, self.engaged = place, True
 
-    @property
-    def busy(self) -> bool:
-        """Whether the active leader's clutch is closed."""
-        return self.active != NOBODY and self._closed[self.active]
+    def release(self) -> None:
+        """Let nobody lead until a clutch closes anew."""
+        self.engaged = False
