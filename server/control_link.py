@@ -46,6 +46,8 @@ WEB_TIMEOUT_NS = 1_000_000_000
 LEADER_GONE_NS = 1_000_000_000
 """A leader silent for longer (and for ten of its own time-outs) no longer keeps others out."""
 
+_REQUESTS = frozenset(int(request) for request in Request)
+
 
 class PathStart(NamedTuple):
     """A path to play: (n, 8) samples (time in s, position in m, w, x, y, z), and its number."""
@@ -148,7 +150,7 @@ class ControlLink:
                 self.path_start = self._map_path(message)
             elif kind == PATH_STOP:
                 self.path_stop = True
-            else:
+            elif kind in _REQUESTS:
                 self.request = kind
             return
 

@@ -43,6 +43,8 @@ class ControlRunner:
         loop.leader = link.leader
         self._header = loop.record["header"][0]
         self._paths = PathBuilder()
+        # A path counts as taken in when it plays, and so does what was requested after it.
+        self._answered = link.request_sequence
         self._stopping = False
         self._until_lifeline = _LIFELINE_EVERY_TICKS
         self._collected_ns = 0
@@ -77,7 +79,7 @@ class ControlRunner:
         link.poll(now_ns)
         self._take_in()
         loop.step()
-        self._header["request_sequence"] = link.request_sequence
+        self._header["request_sequence"] = self._answered
         self._header["stamp_ns"] = time.monotonic_ns()
         link.publish(loop.record)
 
@@ -96,8 +98,10 @@ class ControlRunner:
         if link.path_start is not None:
             self._paths.start(link.path_start)
         ready = self._paths.take()
-        if ready is not None:
+        if ready is not None and ready.path is not None:
             loop.start_path(ready.path, ready.path_id)
+        if not self._paths.is_waiting:
+            self._answered = link.request_sequence
 
     def _between_ticks(self, deadline_ns: int) -> None:
         """What may be done rarely, in the time left until the next deadline."""
