@@ -1,0 +1,270 @@
+"""From a record to the JSON message that the API, the stream and the page speak. Pure.
+
+SI becomes millimetres and degrees here, with the unit in the name. A number that is not known (NaN,
+or no record yet) is null.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot.configuration import Configuration
+from robot.parameters import parameters
+from robot.priority.levels import CASE_NAMES
+from robot.priority.limits import describe
+from robot.records import (
+    LAMBDA,
+    RECORD,
+    Alignment,
+    Case,
+    Coordinates,
+    ErrorSource,
+    LeaderKind,
+    Refusal,
+    Safety,
+    Solver,
+)
+from robot.safety import REASONS, Event
+
+MESSAGE_SCHEMA_VERSION = 1
+
+CASES = {case: name for name, case in CASE_NAMES.items()}
+SOLVERS = {solver: solver.name.lower().replace("_", "-") for solver in Solver}
+COORDINATES = {coordinates: coordinates.name.lower() for coordinates in Coordinates}
+ALIGNMENTS = {alignment: alignment.name.lower() for alignment in Alignment}
+
+_REFUSED: dict[Refusal, tuple[str, str]] = {
+    Refusal.TARGET_TOO_FAR: ("the target is too far from the tip", "choose a nearer target"),
+    Refusal.NOT_ALIGNED: (
+        "the leader does not point as the tip does",
+        "turn the leader, or choose relative alignment",
+    ),
+    Refusal.HOLD_NOT_PRESSED: ("hold-to-move is not pressed", "hold it while moving"),
+}
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a state message tells beside the record.
+
+    Attributes:
+        now_ns: the host's monotonic clock.
+        control: ``running``, ``starting`` or ``down``.
+        control_words: why control does not run, empty when it does.
+        plant: name of the plant.
+        realtime: scheduling of the control process, in words.
+        path_name: name of the path that plays, if one does.
+        rate_hz: measured rate of the loop, None while it is not known.
+        real_time_factor: plant time over host time, None while it is not known.
+    """
+
+    now_ns: int
+    control: str
+    control_words: str = ""
+    plant: str = ""
+    realtime: str = ""
+    path_name: str | None = None
+    rate_hz: float | None = None
+    real_time_factor: float | None = None
+
+
+@dataclass(frozen=True)
+class OperatorView:
+    """Who drives, as one reader of the message sees it."""
+
+    name: str | None = None
+    you: bool = False
+    expires_in_s: float | None = None
+
+
+def _round(value: float, digits: int) -> float | None:
+    return round(float(value), digits) if math.isfinite(value) else None
+
+
+def _each(values: NDArray[Any], digits: int) -> list[float | None]:
+    return [_round(value, digits) for value in values.tolist()]
+
+
+def _millimetres(position: NDArray[Any]) -> list[float | None]:
+    return _each(position * 1e3, 6)
+
+
+def _degrees(angles: NDArray[Any]) -> list[float | None]:
+    return _each(np.rad2deg(angles), 5)
+
+
+def _pose(position: NDArray[Any], wxyz: NDArray[Any]) -> dict[str, Any]:
+    return {"position_mm": _millimetres(position), "orientation_wxyz": _each(wxyz, 9)}
+
+
+def _nulled(value: object) -> Any:
+    """``value`` with every number in it replaced by null."""
+    if isinstance(value, dict):
+        return {key: _nulled(part) for key, part in value.items()}
+    if isinstance(value, list):
+        return [_nulled(part) for part in value]
+    return None if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+class StateMessages:
+    """Makes state messages for one configuration.
+
+    Args:
+        configuration: of the robot whose records come.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        self._parameters = parameters(configuration)
+        self._teleoperation = configuration.teleoperation
+        self._limits = configuration.limits
+        lower, upper = self._parameters["joint_lower"][0], self._parameters["joint_upper"][0]
+        self._joint_limits = [
+            list(pair) for pair in zip(_degrees(lower), _degrees(upper), strict=True)
+        ]
+
+    def message(
+        self, record: NDArray[Any] | None, around: Surroundings, operator: OperatorView
+    ) -> dict[str, Any]:
+        """The state message.
+
+        Args:
+            record: (1,) RECORD, or None before control has published one.
+            around: what is known beside the record.
+            operator: who drives, seen by the reader.
+        """
+        known = np.zeros(1, RECORD) if record is None else record
+        body = self._body(known[0], around)
+        if record is None:
+            body = {**_nulled(body), "joint_limits_deg": self._joint_limits}
+        return {
+            "type": "state",
+            "schema_version": MESSAGE_SCHEMA_VERSION,
+            "robot": "instrument",
+            **body,
+            "safety": _safety(known[0], around),
+            "operator": {
+                "name": operator.name,
+                "you": operator.you,
+                "expires_in_s": None
+                if operator.expires_in_s is None
+                else round(operator.expires_in_s, 2),
+            },
+            "plant": around.plant,
+            "recording": False,
+            "control": around.control,
+        }
+
+    def _body(self, record: np.void, around: Surroundings) -> dict[str, Any]:
+        header, tick_input, truth = record["header"], record["input"], record["truth"]
+        state, report = record["outcome"]["state"], record["outcome"]["report"]
+        return {
+            "tick": int(header["tick"]),
+            "time_s": _round(header["time_ns"] * 1e-9, 6),
+            "age_ms": _round(max(0, around.now_ns - int(header["stamp_ns"])) * 1e-6, 3),
+            "engaged": bool(state["engaged"]),
+            "leader": LeaderKind(int(state["leader_kind"])).name.lower(),
+            "hold": bool(tick_input["hold"]),
+            "priority": _priority(tick_input["settings"]),
+            "teleoperation": self._teleoperation_of(tick_input["settings"]),
+            "errors": {
+                "position_mm": _round(truth["position_error"] * 1e3, 6),
+                "orientation_deg": _round(math.degrees(truth["orientation_error"]), 6),
+                "rcm_mm": _round(truth["rcm_error"] * 1e3, 6),
+                "source": ErrorSource(int(truth["source"])).name.lower(),
+            },
+            **self._configuration_of(record),
+            "desired": _pose(report["desired_position"], report["desired_wxyz"]),
+            "commanded": _pose(report["commanded_position"], report["commanded_wxyz"]),
+            "true": _pose(truth["position"], truth["wxyz"]),
+            "trocar_mm": _millimetres(tick_input["trocar_position"]),
+            "residuals": {
+                "rcm_mm_s": _round(report["residual_rcm"] * 1e3, 4),
+                "linear_mm_s": _round(report["residual_linear"] * 1e3, 4),
+                "angular_deg_s": _round(math.degrees(report["residual_angular"]), 4),
+            },
+            "limits": describe(int(report["limits_active"]), report["x"], self._parameters),
+            "loop": _loop(header, around),
+            "path": _path(header, around),
+        }
+
+    def _teleoperation_of(self, settings: np.void) -> dict[str, Any]:
+        return {
+            "motion_scale": _round(settings["motion_scale"], 6),
+            "motion_scale_min": self._teleoperation.motion_scale_min,
+            "motion_scale_max": self._teleoperation.motion_scale_max,
+            "lock_rotation": bool(settings["lock_rotation"]),
+            "lock_translation": bool(settings["lock_translation"]),
+            "alignment": ALIGNMENTS[Alignment(int(settings["alignment"]))],
+            "hold_to_move": bool(settings["hold_to_move"]),
+        }
+
+    def _configuration_of(self, record: np.void) -> dict[str, Any]:
+        """Joints, bend and lambda as commanded, with their limits."""
+        command, report = record["outcome"]["command"], record["outcome"]["report"]
+        x = report["x"]
+        return {
+            "lambda": {
+                "value": _round(x[LAMBDA], 6),
+                "reference": _round(record["input"]["settings"]["lambda_reference"], 6),
+                "min": self._limits.lambda_min,
+                "max": self._limits.lambda_max,
+            },
+            "bend_deg": _round(math.degrees(report["theta"]), 5),
+            "bend_limit_deg": self._limits.bend_deg,
+            "direction_deg": _round(math.degrees(report["delta"]), 5),
+            "joints_deg": _degrees(x[:7]),
+            "joint_limits_deg": self._joint_limits,
+            "servos_deg": _degrees(command["servo"]),
+        }
+
+
+def _safety(record: np.void, around: Surroundings) -> dict[str, str]:
+    state = record["outcome"]["state"]
+    event = Event(int(state["reason"]))
+    reason, action = REASONS[event]
+    code = "ready" if event == Event.ENABLE else event.name.lower()
+    refused = Refusal(int(record["outcome"]["report"]["target_refused"]))
+    if refused != Refusal.NONE and state["safety"] == Safety.ENABLED:
+        (reason, action), code = _REFUSED[refused], refused.name.lower()
+    if around.control != "running":
+        code = f"control_{around.control}"
+        reason = around.control_words or f"control is {around.control}"
+        action = "wait a moment" if around.control == "starting" else "start Keyhole again"
+    return {
+        "state": Safety(int(state["safety"])).name,
+        "reason": reason,
+        "reason_code": code,
+        "action": action,
+    }
+
+
+def _priority(settings: np.void) -> dict[str, str]:
+    return {
+        "case": CASES[Case(int(settings["case"]))],
+        "solver": SOLVERS[Solver(int(settings["solver"]))],
+        "coordinates": COORDINATES[Coordinates(int(settings["coordinates"]))],
+    }
+
+
+def _loop(header: np.void, around: Surroundings) -> dict[str, Any]:
+    return {
+        "rate_hz": None if around.rate_hz is None else _round(around.rate_hz, 1),
+        "overruns": int(header["overruns"]),
+        "lateness_us": _round(header["lateness_ns"] * 1e-3, 1),
+        "tick_us": _round(header["tick_ns"] * 1e-3, 1),
+        "realtime": around.realtime,
+        "real_time_factor": None
+        if around.real_time_factor is None
+        else _round(around.real_time_factor, 4),
+    }
+
+
+def _path(header: np.void, around: Surroundings) -> dict[str, Any] | None:
+    if header["path_id"] == 0:
+        return None
+    return {"name": around.path_name, "progress": _round(float(header["path_progress"]), 4)}
