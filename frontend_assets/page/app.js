@@ -17,6 +17,7 @@ import { showFacts, showSafety } from "/assets/topbar.js";
 import { Traces } from "/assets/traces.js";
 
 const SHOW_MS = 100;
+const LATE_S = 1;
 const LEADERS = { none: "none", gizmo: "gizmo", api_pose: "API, relative pose", api_target: "API, target pose", path: "path" };
 
 window.keyhole = { state: null };
@@ -36,13 +37,18 @@ const urgencyOf = ({ safety, operator, engaged, path, control }) =>
   [safety.state, safety.reason_code, operator.name, operator.you, engaged, path?.name, control].join();
 
 function take(state) {
+  if (isLate(state, window.keyhole.state)) return;
   window.keyhole.state = state;
   stream.driving = state.operator.you;
-  traces.take(state);
+  if (state.time_s !== null) traces.take(state);
   const urgency = urgencyOf(state);
   if (urgency !== urgent || performance.now() - shown >= SHOW_MS) show();
   urgent = urgency;
 }
+
+/** The answer to a request can overtake a state that is on its way in the stream. */
+const isLate = (state, newest) =>
+  newest !== null && state.time_s < newest.time_s && newest.time_s - state.time_s < LATE_S;
 
 function show() {
   const state = window.keyhole.state;
@@ -62,7 +68,8 @@ function show() {
 
 function showLeader({ leader, engaged, plant }) {
   setText(byId("leader"), LEADERS[leader] ?? leader);
-  setText(byId("engaged"), `${engaged ? "· engaged" : "· not engaged"} · ${plant} robot`);
+  setText(byId("engaged"), engaged ? "· engaged" : "· not engaged");
+  setText(byId("plant"), `· ${plant} robot`);
 }
 
 function onLink(change) {
@@ -85,10 +92,10 @@ async function configure() {
   }
 }
 
+// Not modal: the emergency stop beside it must stay within reach of the mouse.
 const help = byId("help-dialog");
-byId("help").addEventListener("click", () => (help.open ? help.close() : help.showModal()));
+byId("help").addEventListener("click", () => (help.open ? help.close() : help.show()));
 byId("help-close").addEventListener("click", () => help.close());
-help.addEventListener("click", (event) => event.target === help && help.close());
 byId("theme").addEventListener("click", switchTheme);
 byId("retry").addEventListener("click", () => stream.connect());
 

@@ -8,6 +8,9 @@ export function figure(value) {
   return fixed(value, places);
 }
 
+/** As `figure`, with a digit more: for errors that matter below a micrometre. */
+export const fine = (value) => (Math.abs(value) < 0.09995 ? fixed(value, 4) : figure(value));
+
 export function fixed(value, places) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const text = value.toFixed(places);
@@ -16,3 +19,10 @@ export function fixed(value, places) {
 }
 
 export const percent = (share) => `${Math.round(share * 100)} %`;
+
+/** A reason as a sentence: capital first, full stop last. */
+export function sentence(words) {
+  const text = words.trim();
+  if (text === "") return "";
+  return text[0].toUpperCase() + text.slice(1) + (/[.!?]$/.test(text) ? "" : ".");
+}

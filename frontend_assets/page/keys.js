@@ -64,13 +64,15 @@ function down(event, acts) {
     if (!event.repeat) acts.stop();
     return;
   }
-  if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
+  if (event.ctrlKey || event.metaKey || event.altKey || isText(event.target)) return;
   if (event.key === " ") {
     if (!acts.holdsToMove()) return;
     event.preventDefault();
     if (!event.repeat) acts.hold(true);
     return;
   }
+  // A list takes letters to find its entries.
+  if (event.target?.tagName === "SELECT") return;
   const shortcut = KEYS.find((entry) => entry.key === event.key.toLowerCase());
   if (!shortcut) return;
   event.preventDefault();
@@ -82,7 +84,7 @@ function down(event, acts) {
 function up(event, acts) {
   if (event.key !== " ") return;
   // A button under focus must not take the release for a press.
-  if (acts.holdsToMove() && !isTyping(event.target)) event.preventDefault();
+  if (acts.holdsToMove() && !isText(event.target)) event.preventDefault();
   acts.hold(false);
 }
 
@@ -102,11 +104,11 @@ function nextOf(name) {
   return all[(all.findIndex((input) => input.checked) + 1) % all.length];
 }
 
-/** True where keys belong to a text field; a checkbox or a slider does not take letters. */
-function isTyping(target) {
+/** True where keys belong to a text field; a checkbox or a slider takes no letters. */
+function isText(target) {
   const kind = target?.tagName;
   if (kind === "INPUT") return !["checkbox", "radio", "range", "file", "button"].includes(target.type);
-  return kind === "TEXTAREA" || kind === "SELECT" || target?.isContentEditable === true;
+  return kind === "TEXTAREA" || target?.isContentEditable === true;
 }
 
 function fillHelp() {

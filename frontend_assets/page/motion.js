@@ -1,11 +1,10 @@
 // Safety requests and hold-to-move.
 
 import { call, ROBOT } from "/assets/api.js";
-import { byId, onPress, setBlocked, setHidden, setText } from "/assets/dom.js";
+import { byId, onPress, setBlocked, setData, setText } from "/assets/dom.js";
 import { attempt, refuse } from "/assets/notices.js";
 
 const REQUESTS = ["enable", "pause", "disable", "reset"];
-const AGAIN_MS = 400;
 
 /** Where a request has no sense, and why. A missing entry means that it may be asked for. */
 const SENSELESS = {
@@ -31,11 +30,9 @@ export class Motion {
   constructor(stream, take) {
     this.stream = stream;
     this.take = take;
-    this.stopped = -Infinity;
     this.holdBlocked = "No connection to the server.";
     for (const name of REQUESTS) onPress(byId(name), () => this.#ask(name), refuse);
-    byId("emergency-stop").addEventListener("pointerdown", (event) => event.button === 0 && this.stop());
-    byId("emergency-stop").addEventListener("click", () => this.stop());
+    this.#startStop(byId("emergency-stop"));
     this.#startHold(byId("hold"));
   }
 
@@ -44,11 +41,21 @@ export class Motion {
     if (state?.type === "state") this.take(state);
   }
 
+  /** It stops when the button goes down; the click that ends the same press is not a second one. */
+  #startStop(button) {
+    let down = false;
+    button.addEventListener("pointerdown", (event) => {
+      down = event.button === 0;
+      if (down) this.stop();
+    });
+    button.addEventListener("click", () => {
+      if (!down) this.stop();
+      down = false;
+    });
+  }
+
   /** Both ways at once: whichever arrives first stops the robot; a second stop does no harm. */
   async stop() {
-    const now = performance.now();
-    if (now - this.stopped < AGAIN_MS) return;
-    this.stopped = now;
     this.stream.send({ type: "emergency-stop" });
     try {
       const state = await call("POST", `${ROBOT}/emergency-stop`);
@@ -70,11 +77,6 @@ export class Motion {
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
       button.addEventListener(end, () => this.hold(false));
     }
-    button.addEventListener("keydown", (event) => {
-      if (event.key === "Enter" && !event.repeat) this.hold(true);
-    });
-    button.addEventListener("keyup", (event) => event.key === "Enter" && this.hold(false));
-    button.addEventListener("blur", () => this.hold(false));
     button.addEventListener("contextmenu", (event) => event.preventDefault());
   }
 
@@ -100,8 +102,8 @@ export class Motion {
       byId(request).classList.toggle("next", NEXT[name] === request && !blocked);
     }
     this.#showHoldable(state, blocked);
-    setHidden(byId("watcher-note"), blocked === "");
-    setText(byId("watcher-note"), blocked && up ? `Watching. ${blocked} The emergency stop works for everyone.` : blocked);
+    setText(byId("watcher-note"), blocked);
+    setData(byId("watcher-note"), "why", blocked);
   }
 
   #showHoldable(state, blocked) {

@@ -1,8 +1,9 @@
 // What the page tells the person: short toasts, the banner of a fault, the lost connection.
 
 import { byId, make, setData, setHidden, setText } from "/assets/dom.js";
+import { sentence } from "/assets/format.js";
 
-const SHOWN_MS = { info: 5000, error: 12000 };
+const SHOWN_MS = { info: 5000, error: 8000 };
 const AT_MOST = 3;
 
 /** Show a short message; the same message is not shown twice at once. */
@@ -45,9 +46,13 @@ export function showBanner(state) {
 }
 
 function bannerOf({ safety, control }) {
-  if (control === "starting") return ["Control is starting", "The robot answers in a moment.", "notice"];
-  if (control === "down") return ["Control is down", "Nothing moves. The control process has ended; start Keyhole again.", "fault"];
-  if (safety.state === "FAULT") return [`Fault: ${safety.reason}`, safety.action, "fault"];
+  if (control !== "running") {
+    const title = `Control is ${control}`;
+    const reason = sentence(safety.reason);
+    const words = [reason === `${title}.` ? "" : reason, sentence(safety.action)];
+    return [title, words.join(" ").trim(), control === "starting" ? "notice" : "fault"];
+  }
+  if (safety.state === "FAULT") return [`Fault: ${safety.reason}`, sentence(safety.action), "fault"];
   return ["", "", "fault"];
 }
 

@@ -1,9 +1,9 @@
 // The numbers below the plots: poses, limits in words, joints, servos, what each level leaves.
 
-import { byId, make, setData, setText } from "/assets/dom.js";
+import { byId, make, setData, setHidden, setText } from "/assets/dom.js";
 import { figure, fixed } from "/assets/format.js";
 
-const NEAR = 0.03;
+const NEAR_DEG = 5;
 const POSES = [
   ["desired", "Desired"],
   ["commanded", "Commanded"],
@@ -114,10 +114,11 @@ function barRow(name, id) {
 function showBar(row, value, range) {
   setText(row.lastChild, fixed(value, 1));
   const [, bar] = row.children;
-  bar.hidden = range === null;
-  if (range === null) return;
+  const known = range !== null && value !== null;
+  setHidden(bar, !known);
+  if (!known) return;
   const share = Math.min(1, Math.max(0, (value - range[0]) / (range[1] - range[0])));
   bar.firstChild.style.left = `${(share * 100).toFixed(1)}%`;
-  row.classList.toggle("near", share < NEAR || share > 1 - NEAR);
+  row.classList.toggle("near", value - range[0] < NEAR_DEG || range[1] - value < NEAR_DEG);
   setData(row, "tip", `From ${fixed(range[0], 1)} to ${fixed(range[1], 1)} deg`);
 }

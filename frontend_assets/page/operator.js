@@ -1,7 +1,7 @@
 // Who drives: take, release and hand over control. One person drives, the others watch.
 
 import { actUnder, call, ROBOT } from "/assets/api.js";
-import { byId, onPress, setBlocked, setHidden, setText } from "/assets/dom.js";
+import { byId, onPress, setBlocked, setData, setHidden, setText } from "/assets/dom.js";
 import { attempt, refuse, tell } from "/assets/notices.js";
 
 const KEY = "keyhole-operator";
@@ -43,6 +43,7 @@ async function handOver(to) {
 /** Why this page may not drive now, or "". */
 export function whyNotDriving(state, up) {
   if (!up) return "No connection to the server.";
+  if (state.control !== "running") return `Control is ${state.control}.`;
   if (state.operator.you) return "";
   if (state.operator.name) return `${state.operator.name} drives. Ask for a hand over.`;
   return "Take control first.";
@@ -50,9 +51,10 @@ export function whyNotDriving(state, up) {
 
 export function showOperator({ operator }, up) {
   const { name, you } = operator;
-  setText(byId("operator-role"), you ? "You drive" : "Watching");
-  setText(byId("operator-who"), you ? `as ${name}` : name ? `${name} drives` : "No one drives");
-  byId("operator-who").title = name ?? "";
+  const who = you ? `as ${name}` : name ? `${name} drives` : "No one drives";
+  setText(byId("operator-role"), !up ? "Not connected" : you ? "You drive" : "Watching");
+  setText(byId("operator-who"), up ? who : "");
+  setData(byId("operator-who"), "tip", who);
   setHidden(byId("take-control"), you);
   setHidden(byId("release-control"), !you);
   byId("take-control").classList.toggle("primary", !name);

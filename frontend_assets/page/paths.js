@@ -44,7 +44,8 @@ export class Paths {
     if (!file) return;
     if (this.blocked) return refuse(this.blocked);
     if (file.size > LARGEST_BYTES) return refuse(`${file.name} is larger than ${LARGEST_BYTES / 1e6} MB.`);
-    if (await this.#play({ csv: await file.text() })) tell(`Playing ${file.name}.`);
+    const name = file.name.slice(0, 80);
+    if (await this.#play({ csv: await file.text(), name })) tell(`Playing ${file.name}.`);
   }
 
   #startDrop() {
@@ -65,8 +66,9 @@ export class Paths {
     this.blocked = blocked || asleep || running;
     setBlocked(byId("play"), this.blocked || (this.titles.size ? "" : "No experiments were listed."));
     setBlocked(byId("stop-path"), blocked || (path ? "" : "No path is playing."));
-    byId("path-progress").value = path ? path.progress : 0;
-    const name = path ? (this.titles.get(path.name) ?? path.name) : "";
-    setText(byId("path-text"), path ? `${name} ${percent(path.progress)}` : "No path");
+    byId("path-progress").value = path?.progress ?? 0;
+    const name = this.titles.get(path?.name) ?? path?.name ?? "Path";
+    setText(byId("path-text"), path ? `${percent(path.progress ?? 0)} ${name}` : "No path");
+    setData(byId("path-text"), "tip", path ? name : "No path is playing");
   }
 }

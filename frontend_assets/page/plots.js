@@ -142,8 +142,9 @@ function drawGrid(context, area, { window_s, low, high, y }) {
 }
 
 function tickText(value, span) {
-  const places = Math.max(0, Math.min(4, Math.ceil(-Math.log10(span / 2) + 0.001)));
-  return value.toFixed(Number.isInteger(value) ? 0 : places).replace("-", "\u2212");
+  let places = 0;
+  while (places < 5 && Math.abs(Number(value.toFixed(places)) - value) > 1e-6 * span) places += 1;
+  return value.toFixed(places).replace("-", "\u2212");
 }
 
 function drawLine(context, area, { kind }, y) {
@@ -167,9 +168,11 @@ function labelLine(context, area, { kind, label }, y) {
   context.lineWidth = 3;
   context.lineJoin = "round";
   context.strokeStyle = colour("panel");
-  context.strokeText(label, area.left + 4, above ? y - 1 : y + 2);
+  // A reference stands further in, where it cannot meet the label of a limit close by.
+  const place = [area.left + (kind === "limit" ? 4 : 76), above ? y - 1 : y + 2];
+  context.strokeText(label, ...place);
   context.fillStyle = colour(kind === "limit" ? "limit" : "muted");
-  context.fillText(label, area.left + 4, above ? y - 1 : y + 2);
+  context.fillText(label, ...place);
 }
 
 function drawCursor(context, area, x) {

@@ -1,20 +1,42 @@
 // The scene: viser in an iframe of the same origin, its camera and its colours.
 
-import { byId } from "/assets/dom.js";
+import { call } from "/assets/api.js";
+import { byId, setText } from "/assets/dom.js";
 import { isDark, onTheme } from "/assets/theme.js";
+
+const ASK_MS = 400;
 
 const frame = () => byId("scene");
 
-/** Load the scene; `?fixedDpr=` of the page is passed on (a coarser picture for slow machines). */
-export function startScene() {
-  const scheme = location.protocol === "https:" ? "wss" : "ws";
-  let source = `/viser/?websocket=${encodeURIComponent(`${scheme}://${location.host}/viser`)}&hideViserLogo`;
-  const ratio = new URLSearchParams(location.search).get("fixedDpr");
-  if (ratio !== null) source += `&fixedDpr=${encodeURIComponent(ratio)}`;
-  if (isDark()) source += "&darkMode";
-  frame().src = source;
+/** Load the scene once the server has one to show. */
+export async function startScene() {
   frame().addEventListener("load", followTheme);
   onTheme(followTheme);
+  for (;;) {
+    const scene = await sceneWords();
+    if (scene === "ready") break;
+    setText(byId("stage-wait"), scene === "loading" ? "Loading the scene…" : scene);
+    await new Promise((resolve) => setTimeout(resolve, ASK_MS));
+  }
+  frame().src = source();
+}
+
+async function sceneWords() {
+  try {
+    return (await call("GET", "/api/v1/health")).scene ?? "ready";
+  } catch {
+    return "loading";
+  }
+}
+
+/** `?fixedDpr=` of the page is passed on: a coarser picture for slow machines. */
+function source() {
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  let address = `/viser/?websocket=${encodeURIComponent(`${scheme}://${location.host}/viser`)}&hideViserLogo`;
+  const ratio = new URLSearchParams(location.search).get("fixedDpr");
+  if (ratio !== null) address += `&fixedDpr=${encodeURIComponent(ratio)}`;
+  if (isDark()) address += "&darkMode";
+  return address;
 }
 
 /** The window of the scene, or null while it cannot be reached. */

@@ -103,6 +103,16 @@ export class Settings {
     return !(this.busy.get(key) > performance.now());
   }
 
+  #showRange({ motion_scale, motion_scale_min, motion_scale_max }) {
+    if (motion_scale === null) return;
+    this.range = { min: motion_scale_min, max: motion_scale_max };
+    setText(byId("motion-scale-min"), `${motion_scale_min} ×`);
+    setText(byId("motion-scale-max"), `${motion_scale_max} ×`);
+    if (!this.#isFree("motion_scale")) return;
+    byId("motion-scale").value = String(this.#position(motion_scale));
+    this.#showScale(motion_scale);
+  }
+
   show({ priority, teleoperation }, blocked) {
     for (const [id, key] of Object.entries(SWITCHES)) {
       if (this.#isFree(key)) byId(id).checked = teleoperation[key];
@@ -112,13 +122,7 @@ export class Settings {
     for (const key of ["solver", "coordinates"]) {
       if (this.#isFree(key) && document.activeElement !== byId(key)) byId(key).value = priority[key];
     }
-    this.range = { min: teleoperation.motion_scale_min, max: teleoperation.motion_scale_max };
-    setText(byId("motion-scale-min"), `${this.range.min} ×`);
-    setText(byId("motion-scale-max"), `${this.range.max} ×`);
-    if (this.#isFree("motion_scale")) {
-      byId("motion-scale").value = String(this.#position(teleoperation.motion_scale));
-      this.#showScale(teleoperation.motion_scale);
-    }
+    this.#showRange(teleoperation);
     for (const input of document.querySelectorAll("input.drive, select.drive")) setUnusable(input, blocked);
     if (!blocked && priority.solver === "hqp") setUnusable(byId("coordinates"), "The QP always uses u, v.");
     setBlocked(byId("align-view"), blocked);

@@ -1,16 +1,17 @@
 // The top bar's left half: safety state in words, and how healthy the loop is.
 
 import { byId, setData, setText } from "/assets/dom.js";
-import { figure } from "/assets/format.js";
+import { figure, fixed, sentence } from "/assets/format.js";
 
 const ICONS = { ENABLED: "enabled", PAUSED: "paused", DISABLED: "disabled", FAULT: "fault" };
 const STALE_MS = 100;
 const DEAD_MS = 500;
 
-export function showSafety({ safety }, up) {
-  const state = up ? safety.state : "NONE";
+export function showSafety({ safety, control }, up) {
+  const known = up && control === "running";
+  const state = known ? safety.state : "NONE";
   setData(byId("safety"), "state", state);
-  setText(byId("safety-state"), up ? safety.state : "NO CONNECTION");
+  setText(byId("safety-state"), known ? safety.state : up ? `CONTROL ${control.toUpperCase()}` : "NO CONNECTION");
   const icon = `#icon-${ICONS[state] ?? "link"}`;
   if (byId("safety-icon").getAttribute("href") !== icon) byId("safety-icon").setAttribute("href", icon);
   const reason = sentence(safety.reason);
@@ -21,25 +22,19 @@ export function showSafety({ safety }, up) {
   setData(byId("safety-words"), "tip", [reason, action].filter(Boolean).join(" "));
 }
 
-function sentence(words) {
-  const text = words.trim();
-  if (text === "") return "";
-  return text[0].toUpperCase() + text.slice(1) + (/[.!?]$/.test(text) ? "" : ".");
-}
-
 /** `silence_ms`: time since the last message, which counts as age too. */
 export function showFacts({ age_ms, loop, recording }, silence_ms) {
-  const age = age_ms + (silence_ms > STALE_MS ? silence_ms : 0);
-  setText(byId("age"), age >= 10000 ? "> 9999" : age >= 10 ? String(Math.round(age)) : figure(age));
+  const age = age_ms === null ? null : age_ms + (silence_ms > STALE_MS ? silence_ms : 0);
+  setText(byId("age"), age >= 10000 ? "> 9999" : fixed(age, age < 10 ? 1 : 0));
   setData(byId("fact-age"), "level", age > DEAD_MS ? "bad" : age > STALE_MS ? "warn" : "");
-  setText(byId("rate"), String(Math.round(loop.rate_hz)));
-  setText(byId("overruns"), String(loop.overruns));
+  setText(byId("rate"), fixed(loop.rate_hz, 0));
+  setText(byId("overruns"), fixed(loop.overruns, 0));
   const factor = loop.real_time_factor;
   const slow = factor !== null && factor < 0.98;
-  setText(byId("realtime"), slow ? `×${factor.toFixed(2)}` : /^off/.test(loop.realtime) ? "Off" : "On");
+  setText(byId("realtime"), slow ? `×${factor.toFixed(2)}` : loop.realtime === "" ? "–" : /^off/.test(loop.realtime) ? "Off" : "On");
   setData(byId("fact-realtime"), "level", slow ? "warn" : "");
   setData(byId("fact-realtime"), "tip",
-    `Scheduling: ${loop.realtime}. Simulated time runs at ${figure(factor)} × real time`);
+    `Scheduling: ${loop.realtime || "not known"}. Simulated time runs at ${figure(factor)} × real time`);
   setData(byId("fact-rate"), "tip",
     `Rate of the control loop. The last tick began ${figure(loop.lateness_us)} µs late and took ${figure(loop.tick_us)} µs`);
   setText(byId("recording"), recording ? "● On" : "Off");

@@ -1,18 +1,18 @@
 // The five plots of the monitor, their readings, the time window, freeze and the shared cursor.
 
 import { byId, make, setText } from "/assets/dom.js";
-import { figure, fixed } from "/assets/format.js";
+import { figure, fine, fixed } from "/assets/format.js";
 import { History } from "/assets/history.js";
 import { Plot, drawTimeAxis, forgetColours, timeAt } from "/assets/plots.js";
 import { onTheme } from "/assets/theme.js";
 
-const LAMBDA = "λ, trocar along the shaft";
+const LAMBDA = "λ at the trocar";
 
 /** `floor`: least top of the y axis, so that numerical noise does not fill the plot. */
 const TRACES = [
   { key: "position", title: "Position error", unit: "mm", floor: 0.01, text: figure },
   { key: "orientation", title: "Orientation error", unit: "deg", floor: 0.01, text: figure },
-  { key: "rcm", title: "RCM error", unit: "mm", floor: 0.01, text: figure },
+  { key: "rcm", title: "RCM error", unit: "mm", floor: 0.01, text: fine },
   { key: "lambda", title: LAMBDA, unit: "0–1", word: "commanded", span: () => [0, 1], text: (value) => fixed(value, 3), both: true },
   { key: "bend", title: "Bend", unit: "deg", word: "commanded", span: bendSpan, text: (value) => fixed(value, 1) },
 ];
@@ -23,6 +23,7 @@ function bendSpan(lines) {
 }
 
 const DRAW_MS = 100;
+const NEAR_S = 0.5;
 const CURSOR_KEYS = { ArrowLeft: -0.1, ArrowRight: 0.1 };
 
 export class Traces {
@@ -115,7 +116,8 @@ export class Traces {
     this.drawn = performance.now();
     if (this.state === null || document.hidden) return;
     const source = this.state.errors.source;
-    setText(byId("error-source"), `desired − ${source}`);
+    const back_s = this.cursor_s === null ? null : this.#end() - this.cursor_s;
+    setText(byId("error-source"), back_s === null ? `desired − ${source}` : `at −${fixed(back_s, 1)} s`);
     const view = { history: this.frozen ?? this.live, end_s: this.#end(), window_s: this.window_s, cursor_s: this.cursor_s };
     for (const { spec, swatch, now, peak, plot } of this.views) {
       if (!spec.word) {
@@ -149,8 +151,14 @@ export class Traces {
       high = Math.max(high, Number.isNaN(column[place]) ? high : column[place]);
       low = Math.min(low, Number.isNaN(column[place]) ? low : column[place]);
     }
-    const place = cursor_s === null ? history.end - 1 : Math.min(history.place(cursor_s), history.end - 1);
-    setText(now, spec.text(column[place]));
+    setText(now, spec.text(column[placeOf(history, cursor_s)]));
     setText(peak, spec.both ? `${fixed(low, 2)} … ${fixed(high, 2)}` : `max ${spec.text(high)}`);
   }
+}
+
+/** Place of the sample under the cursor; beyond the history's ends there is none. */
+function placeOf(history, cursor_s) {
+  if (cursor_s === null) return history.end - 1;
+  const place = history.place(cursor_s);
+  return history.time[place] - cursor_s < NEAR_S ? place : -1;
 }
