@@ -129,7 +129,7 @@ class Commands(Section):
     angular_speed_min_deg_s: NotNegative
     orientation_threshold_deg: Positive
     orientation_ramp: Annotated[float, Field(gt=1)]
-    rcm_gain_per_s: Annotated[float, Field(ge=0, le=200)]
+    rcm_gain_per_s: Annotated[float, Field(ge=0, le=1000)]
 
 
 class Priority(Section):

@@ -18,10 +18,10 @@ from robot.instrument import project_on_shaft, rcm_jacobian, shaft, tip, tip_jac
 from robot.parameters import parameters
 from robot.priority.closed_form import augmented, polar_columns, prioritized
 from robot.priority.levels import PRESETS, assemble, plan
-from robot.priority.lexicographic import LexicographicProblem
+from robot.priority.lexicographic import LexicographicProblem, error_damping
 from robot.priority.limits import active_limits, rate_limits, share_within
 from robot.records import OUTCOME, Case, Coordinates, Safety, Solver
-from robot.rotations import quaternion_from_matrix
+from robot.rotations import angle_between, quaternion_from_matrix
 from robot.safety import Event, apply_event, decide
 from robot.segment import polar
 from robot.start import start_configuration
@@ -91,8 +91,11 @@ def _tasks(
     catalogue: np.ndarray,
     targets: np.ndarray,
     preferred: np.ndarray,
-) -> None:
-    """Fill the catalogue of task rows, their wanted rates, and the preferred rates."""
+) -> tuple[float, float]:
+    """Fill the catalogue of task rows, their wanted rates, and the preferred rates.
+
+    Returns the tip's position error (m) and orientation error (rad) left over from the last tick.
+    """
     s = outcome[0].state
     i_ = tick_input[0]
     p = parameters[0]
@@ -119,9 +122,10 @@ def _tasks(
         parameters,
         twist,
     )
+    gain = min(p.rcm_gain, 0.5 / i_.dt_s)
     for i in range(3):
         point = base[i] + s.x[9] * (end[i] - base[i])
-        targets[i] = i_.trocar_velocity[i] + p.rcm_gain * (i_.trocar_position[i] - point)
+        targets[i] = i_.trocar_velocity[i] + gain * (i_.trocar_position[i] - point)
         targets[3 + i] = twist[i]
         targets[6 + i] = 0.0
         for j in range(3):
@@ -144,6 +148,10 @@ def _tasks(
             middle = 0.5 * (p.joint_upper[k] + p.joint_lower[k])
             # Steepest descent of sum ((q - middle) / reach)^2 / 2, scaled to rad/s.
             preferred[k] = -p.posture_gain * (s.x[k] - middle) * (math.pi / reach) ** 2
+    square = 0.0
+    for i in range(3):
+        square += (previous_position[i] - s.tip_position[i]) ** 2
+    return math.sqrt(square), angle_between(previous_rotation, s.tip_rotation)
 
 
 @compiled
@@ -189,6 +197,9 @@ def _integrate(
     """Move x by the rates and note what the levels and limits left over."""
     s = outcome[0].state
     report = outcome[0].report
+    for k in range(10):
+        # The solver keeps the box to its tolerance only; this takes out no more than that.
+        rates[k] = min(max(rates[k], lower[k]), upper[k])
     report.limits_active = active_limits(
         s.x, rates, lower, upper, bend_row, bend_bound, parameters
     )
@@ -310,7 +321,7 @@ class InstrumentRobot:
 
     def _move(self, tick_input: np.ndarray, outcome: np.ndarray) -> None:
         work = self._work
-        _tasks(
+        distance, angle = _tasks(
             outcome,
             tick_input,
             self.parameters,
@@ -338,7 +349,7 @@ class InstrumentRobot:
             problem.preferred,
         )
         if settings["solver"] == _HQP:
-            rates, flag = problem.solve()
+            rates, flag = problem.solve(error_damping(distance, angle))
         else:
             rates, flag = self._closed_form(settings, problem, outcome), 1
         if flag <= 0 or not np.isfinite(rates).all():

@@ -167,7 +167,7 @@ def _build(digest: str, lock: int) -> None:
         _pip(aside, builders, "installing what builds the package", lock)
     wanted = ["--no-build-isolation", "-e", "."]
     _pip(aside, wanted, "installing the pinned packages", lock)
-    if (ROOT / "robot" / "compiled.py").exists():
+    if (ROOT / "server" / "compile_controller.py").exists():
         _compile(aside, lock)
     _rename_inside(aside)
     (aside / STAMP).write_text(digest, encoding="utf-8")
@@ -179,7 +179,7 @@ def _build(digest: str, lock: int) -> None:
 
 def _compile(environment: Path, lock: int) -> None:
     """Fill the cache of compiled functions, so that the first start is as quick as later ones."""
-    command = [str(environment / "bin" / "python"), "-m", "robot.compiled"]
+    command = [str(environment / "bin" / "python"), "-m", "server.compile_controller"]
     try:
         _run(command, "compiling the controller (once)", lock)
     except SetUpError as error:

@@ -16,6 +16,27 @@ _SOFT_WEIGHT = 1e-9
 by 4e-4 of its residual; at 1e-12 the solver fails."""
 _PRIMAL_TOLERANCE = 1e-9
 
+_PER_POSITION_ERROR = 0.05
+_PER_ORIENTATION_ERROR = 0.01
+_DAMPING_MAX = 0.02
+
+
+def error_damping(distance: float, angle: float) -> float:
+    """Damping of the levels in proportion to the tip's error, as Levenberg and Marquardt have it.
+
+    A command out of reach pushes against poses in which the tip cannot follow it at all to first
+    order: a segment pulled straight, an arm stretched out. The linear model then asks for any speed
+    and the sign changes every tick. The neglected second-order term is as large as the error, so
+    damping by the error restores it; where the command can be followed the error, and with it the
+    damping, is nothing. Without it, a pull beyond reach shakes the bend with 2700 rad/s^2 (rms);
+    with it 17.
+
+    Args:
+        distance: position error left over from the last tick, m.
+        angle: orientation error left over, rad.
+    """
+    return min(_DAMPING_MAX, _PER_POSITION_ERROR * distance + _PER_ORIENTATION_ERROR * angle)
+
 
 class LexicographicProblem:
     """Memory of one plan's QP: fill it, then solve.
@@ -41,8 +62,11 @@ class LexicographicProblem:
         self._sense = np.zeros(11 + count, dtype=np.int32)
         self._break_points = np.array([11, *(11 + plan.starts[1:])], dtype=np.int32)
 
-    def solve(self) -> tuple[np.ndarray, int]:
+    def solve(self, damping: float) -> tuple[np.ndarray, int]:
         """Rates (10,) and daqp's exit flag (positive: solved).
+
+        Args:
+            damping: of every level, see :func:`error_damping`.
 
         Solved cold every time: a warm start gives rates that differ in the thirteenth digit, and a
         replay could not be compared bit for bit.
@@ -55,7 +79,7 @@ class LexicographicProblem:
             self.lower,
             self._sense,
             self._break_points,
-            rho_soft=_SOFT_WEIGHT,
+            rho_soft=_SOFT_WEIGHT + damping,
             primal_tol=_PRIMAL_TOLERANCE,
         )
         return rates, flag

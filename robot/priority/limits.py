@@ -21,6 +21,9 @@ LAMBDA_HIGH_BIT = 18
 
 BEND_MARGIN = 5e-5
 """Kept from the bend limit, rad: a tick along the limit's circle leaves the tangent by up to this."""
+LAMBDA_MARGIN = 1e-4
+"""Kept from both ends of lambda: the true shaft and the commanded lambda differ by up to this after
+a fast tick."""
 LAMBDA_SPEED = 2.0
 """Largest rate of lambda, 1/s: with a 230 mm shaft, an insertion of 460 mm/s."""
 _TOUCH = 1e-9
@@ -69,7 +72,9 @@ def rate_limits(
         lower[i], upper[i] = _interval(
             x[i], -ratio * p.servo_max, ratio * p.servo_max, ratio * p.servo_speed, gain, dt
         )
-    lower[9], upper[9] = _interval(x[9], p.lambda_min, p.lambda_max, LAMBDA_SPEED, gain, dt)
+    lower[9], upper[9] = _interval(
+        x[9], p.lambda_min + LAMBDA_MARGIN, p.lambda_max - LAMBDA_MARGIN, LAMBDA_SPEED, gain, dt
+    )
     phi = math.hypot(x[7], x[8])
     for i in range(10):
         bend_row[i] = 0.0
@@ -125,6 +130,21 @@ def violations(x: np.ndarray, parameters: np.ndarray) -> int:
         count += 1
     if not p.lambda_min - 1e-12 <= x[9] <= p.lambda_max + 1e-12:
         count += 1
+    return count
+
+
+@compiled
+def speed_violations(x_dot: np.ndarray, parameters: np.ndarray) -> int:
+    """How many speed limits (joints, servos) the rates ``x_dot`` (10,) break."""
+    p = parameters[0]
+    count = 0
+    for i in range(7):
+        if not abs(x_dot[i]) <= p.joint_speed[i] + 1e-9:
+            count += 1
+    fastest = p.servo_speed * p.pulley_radius / p.pitch_radius + 1e-9
+    for i in range(7, 9):
+        if not abs(x_dot[i]) <= fastest:
+            count += 1
     return count
 
 

@@ -1,0 +1,20 @@
+"""Compile the control path once, so that the first start is not the slow one."""
+
+from __future__ import annotations
+
+from server.configuration_file import load
+from server.headless_run import HeadlessRun, RunOptions
+from scenes.experiments import experiment
+
+
+def main() -> None:
+    """Run a few ticks; every compiled function is then in the cache."""
+    configuration = load()
+    path = experiment("circle", configuration).path
+    run = HeadlessRun(configuration, RunOptions("circle", path, "1", "hqp", "uv"))
+    ticks = iter(range(3))
+    run.execute(lambda _: None, lambda: next(ticks, None) is None)
+
+
+if __name__ == "__main__":
+    main()
