@@ -8,33 +8,49 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from frontend_assets.robot_model.arm_links import arm_links
-from frontend_assets.robot_model.glb import glb_bytes, mesh_of
-from frontend_assets.robot_model.instrument_module import instrument_module, shaft
-from frontend_assets.robot_model.shells import Shell
 from robot.configuration import Configuration
 from robot.urdf import ARM_MESHES, MODULE_MESHES, SHAFT_MESHES, urdf_text
 
 FOLDER = Path(__file__).parent
+MODEL_VERSION = 1
+"""Raise this when the code gives other meshes for the same configuration: caches become stale."""
 URDF_NAME, MESH_FOLDER, STAMP_NAME = "keyhole.urdf", "meshes", "geometry.sha256"
+_MODULE_KEYS = {
+    "shaft_base_m",
+    "shaft_direction",
+    "bend_direction",
+    "pulley_radius_m",
+    "adapter_size_m",
+}
+_INSTRUMENT_KEYS = {"shaft_length_m", "shaft_diameter_m"}
 
 
 def geometry_stamp(configuration: Configuration) -> str:
-    """SHA-256 of all that the model depends on: sections ``arm``, ``module``, ``instrument``."""
-    table = configuration.model_dump(mode="json", include={"arm", "module", "instrument"})
-    text = json.dumps(table, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
+    """SHA-256 of all that the model depends on; keys that change no shape leave it as it is."""
+    module, instrument = configuration.module, configuration.instrument
+    shapes = {
+        "model": MODEL_VERSION,
+        "urdf": urdf_text(configuration, MESH_FOLDER),
+        "module": module.model_dump(mode="json", include=_MODULE_KEYS),
+        "instrument": instrument.model_dump(mode="json", include=_INSTRUMENT_KEYS),
+    }
+    return hashlib.sha256(json.dumps(shapes, sort_keys=True).encode()).hexdigest()
 
 
 def mesh_files(configuration: Configuration) -> dict[str, bytes]:
     """All GLB files by mesh name (without ``.glb``)."""
+    # Only a rebuild needs the modelling libraries; finding the committed folder stays quick.
+    from frontend_assets.robot_model.arm_links import arm_links
+    from frontend_assets.robot_model.glb import glb_bytes, mesh_of
+    from frontend_assets.robot_model.instrument_module import instrument_module, shaft
+
     groups = [
         *zip(ARM_MESHES, arm_links(), strict=True),
         (MODULE_MESHES, instrument_module(configuration.module)),
         (SHAFT_MESHES, shaft(configuration.instrument)),
     ]
     return {
-        name: glb_bytes(mesh_of(_part(parts, name), _material(name)), name)
+        name: glb_bytes(mesh_of(parts[_material(name)], _material(name)), name)
         for names, parts in groups
         for name in names
     }
@@ -86,10 +102,6 @@ def _stamp_in(folder: Path) -> str | None:
         return (folder / STAMP_NAME).read_text(encoding="ascii").strip()
     except OSError:
         return None
-
-
-def _part(parts: dict[str, Shell], name: str) -> Shell:
-    return parts[_material(name)]
 
 
 def _material(name: str) -> str:

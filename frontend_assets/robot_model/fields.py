@@ -7,6 +7,7 @@ Smooth unions give the moulded fillets that a robot arm's castings have.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,7 +30,7 @@ def limb(points: Sequence[Sequence[float]], radii: Sequence[float]) -> Field:
 
     def field(p: Array) -> Array:
         best = np.full(len(p), np.inf)
-        for (*a, ra), (*b, rb) in zip(line[:-1], line[1:], strict=True):
+        for (*a, ra), (*b, rb) in pairwise(line):
             axis = np.subtract(b, a)
             t = np.clip((p - a) @ axis / (axis @ axis), 0, 1)
             away = np.linalg.norm(p - a - t[:, None] * axis, axis=1)
@@ -53,7 +54,7 @@ def _smooth_curve(points: Array) -> Array:
 
 
 def drum(start: ArrayLike, end: ArrayLike, radius: float, edge: float) -> Field:
-    """A cylinder from ``start`` to ``end`` [mm] whose rims are rounded with radius ``edge`` [mm]."""
+    """A cylinder from ``start`` to ``end`` [mm], its rims rounded with radius ``edge`` [mm]."""
     a, b = np.array(start, float), np.array(end, float)
     half = np.linalg.norm(b - a) / 2
     axis = (b - a) / (2 * half)

@@ -24,7 +24,7 @@ FINISHES = {
     "dark": Finish((0.035, 0.038, 0.045), 0.0, 0.6),
     "metal": Finish((0.60, 0.61, 0.63), 0.55, 0.32),
     "ivory": Finish((0.84, 0.79, 0.64), 0.0, 0.5),
-    "servo": Finish((0.52, 0.55, 0.66), 0.0, 0.4),
+    "servo": Finish((0.54, 0.56, 0.65), 0.0, 0.4),
 }
 """Looks by material name."""
 
@@ -32,8 +32,8 @@ FINISHES = {
 def mesh_of(shell: Shell, material: str) -> trimesh.Trimesh:
     """A mesh in metres from a shell in millimetres, rounded to a micrometre."""
     finish = FINISHES[material]
-    visual = trimesh.visual.TextureVisuals(
-        material=PBRMaterial(
+    visual = trimesh.visual.TextureVisuals(  # type: ignore[no-untyped-call]
+        material=PBRMaterial(  # type: ignore[no-untyped-call]
             name=material,
             baseColorFactor=[*finish.colour, 1.0],
             metallicFactor=finish.metallic,
@@ -53,6 +53,6 @@ def glb_bytes(mesh: trimesh.Trimesh, name: str) -> bytes:
     """The mesh as a GLB file whose geometry is called ``name``."""
     scene = trimesh.Scene()
     scene.add_geometry(mesh, geom_name=name, node_name=name)
-    data = scene.export(file_type="glb", include_normals=True)
+    data = scene.export(file_type="glb", include_normals=True)  # type: ignore[no-untyped-call]
     assert isinstance(data, bytes)
     return data

@@ -48,11 +48,14 @@ def instrument_module(module: Module) -> dict[str, Shell]:
     turn = _azimuth(module)
     parts = {
         "ivory": [*_housing(base, radius, turn)],
-        "servo": [_flange_ring(), *(_turned(_servo(base[2]), a + turn) for a in _azimuths())],
+        "servo": [
+            _flange_ring(),
+            *(_turned(_servo(base[2]), a + turn) for a in SERVO_AZIMUTHS_DEG),
+        ],
         "dark": [],
         "metal": [],
     }
-    for azimuth in _azimuths():
+    for azimuth in SERVO_AZIMUTHS_DEG:
         for material, solids in (
             ("dark", [*_servo_holes(base[2]), *_pulley(base[2], 1e3 * module.pulley_radius_m)]),
             ("metal", _horn(base[2])),
@@ -84,7 +87,8 @@ def segment_disk(instrument: Instrument) -> Shell:
     for quarter in range(4):
         turn = np.pi / 2 * quarter
         place = 1e3 * instrument.tendon_pitch_radius_m * np.array([np.cos(turn), np.sin(turn), 0])
-        holes.append(rod(place - [0, 0, pitch], place + [0, 0, pitch], hole, 6))
+        over = np.array([0, 0, pitch])
+        holes.append(rod(place - over, place + over, hole, 6))
     return shell_of(body - merged(holes))
 
 
@@ -92,10 +96,6 @@ def _azimuth(module: Module) -> float:
     """Where the shaft leaves, seen along the flange axis [deg]; 0 for a shaft along that axis."""
     x, y, _ = module.shaft_direction
     return float(np.degrees(np.arctan2(y, x))) if np.hypot(x, y) > 1e-9 else 0.0
-
-
-def _azimuths() -> tuple[float, ...]:
-    return SERVO_AZIMUTHS_DEG
 
 
 def _turned(solid: Solid, degrees: float) -> Solid:
@@ -120,7 +120,7 @@ def _arms(top: float) -> list[Solid]:
     solids = []
     outer = SERVO_INNER + SERVO[0]
     half = SERVO[1] / 2
-    for azimuth in _azimuths():
+    for azimuth in SERVO_AZIMUTHS_DEG:
         cap = block((26, -half - 0.8, top - 4), (outer + 0.8, half + 0.8, top + 2))
         notch = block((outer - 8, -4.5, top - 9), (outer + 3, 4.5, top + 5))
         bosses = [
@@ -140,7 +140,7 @@ def _lower_bracket(top: float) -> Solid:
     outer, half = SERVO_INNER + SERVO[0] + 0.8, SERVO[1] / 2 + 0.8
     trays = [
         _turned(block((10, -half, top - 1.5), (outer, half, top + 6.5)), azimuth)
-        for azimuth in _azimuths()
+        for azimuth in SERVO_AZIMUTHS_DEG
     ]
     return merged(trays) - rod((0, 0, top - 9), (0, 0, top + 9), 12)
 
@@ -149,7 +149,7 @@ def _disc(z: float, radius: float) -> Solid:
     disc = bevelled_rod((0, 0, z - _DISC_TOP), (0, 0, z - _DISC_BOTTOM), radius, 0.8, 64)
     passes = [
         _turned(rod((HORN_RADIUS, 0, z - 30), (HORN_RADIUS, 0, z), 11.5, 32), azimuth)
-        for azimuth in _azimuths()
+        for azimuth in SERVO_AZIMUTHS_DEG
     ]
     return disc - merged([*passes, rod((0, 0, z - 30), (0, 0, z), 12)])
 
@@ -159,7 +159,8 @@ def _walls(z: float, radius: float) -> Solid:
     low, high = z - _DISC_BOTTOM - 1, z - _PLATE_TOP + 1
     wall = ring((0, 0, low), (0, 0, high), radius - 2, radius - 7, 64)
     windows = [
-        _turned(block((10, -19, low - 1), (80, 19, high + 1)), azimuth) for azimuth in _azimuths()
+        _turned(block((10, -19, low - 1), (80, 19, high + 1)), azimuth)
+        for azimuth in SERVO_AZIMUTHS_DEG
     ]
     front = block((10, -26, low - 1), (80, 26, high + 1))
     return wall - merged([*windows, front])
@@ -190,14 +191,16 @@ def _servo_holes(z: float) -> list[Solid]:
     """Screw holes as dark discs on the outer and the side faces of the servo on the x axis."""
     half, outer = SERVO[1] / 2, SERVO_INNER + SERVO[0]
     low, high = z - _SERVO_TOP + 9.5, z - _SERVO_BOTTOM - 9.5
+    places = [((outer, y), (1.0, 0.0)) for y in (-8.0, 8.0)]
+    for side in (-1.0, 1.0):
+        places += [((x, side * half), (0.0, side)) for x in (SERVO_INNER + 14, outer - 6)]
     holes = []
-    for height in (low, high):
-        for y in (-8.0, 8.0):
-            holes.append(rod((outer - 1, y, height), (outer + 0.12, y, height), 1.25, SMALL))
-        for x in (SERVO_INNER + 14, outer - 6):
-            for side in (-half, half):
-                sunk, proud = 0.9 * side, side + np.sign(side) * 0.12
-                holes.append(rod((x, sunk, height), (x, proud, height), 1.25, SMALL))
+    for (x, y), outward in places:
+        sunk, proud = -1.0 * np.array(outward), 0.12 * np.array(outward)
+        holes += [
+            rod((x + sunk[0], y + sunk[1], h), (x + proud[0], y + proud[1], h), 1.25, SMALL)
+            for h in (low, high)
+        ]
     return holes
 
 

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
-import manifold3d
+import manifold3d  # type: ignore[import-not-found]  # its stubs lie outside a package
 import numpy as np
 from numpy.typing import ArrayLike
 
 from frontend_assets.robot_model.fields import Array
 from frontend_assets.robot_model.shells import Faces, Shell, creased
 
-Solid = manifold3d.Manifold
+Solid = Any
+"""A ``manifold3d.Manifold``."""
+
+_Manifold = manifold3d.Manifold
 
 ROUND = 48
 """Facets around a large cylinder."""
@@ -23,7 +27,7 @@ def rod(start: ArrayLike, end: ArrayLike, radius: float, facets: int = ROUND) ->
     """A cylinder between two points [mm]."""
     a, b = np.array(start, float), np.array(end, float)
     height = float(np.linalg.norm(b - a))
-    return placed(Solid.cylinder(height, radius, radius, facets), a, b - a)
+    return placed(_Manifold.cylinder(height, radius, radius, facets), a, b - a)
 
 
 def bevelled_rod(
@@ -34,7 +38,7 @@ def bevelled_rod(
     h = float(np.linalg.norm(b - a))
     r = radius
     outline = [[0, 0], [r - bevel, 0], [r, bevel], [r, h - bevel], [r - bevel, h], [0, h]]
-    return placed(Solid.revolve(manifold3d.CrossSection([outline]), facets), a, b - a)
+    return placed(_Manifold.revolve(manifold3d.CrossSection([outline]), facets), a, b - a)
 
 
 def ring(
@@ -50,19 +54,19 @@ def block(low: Sequence[float], high: Sequence[float], edge: float = 0.0) -> Sol
     """An axis-aligned box between two corners [mm], its edges rounded with radius ``edge`` [mm]."""
     a, b = np.array(low, float), np.array(high, float)
     if edge == 0:
-        return Solid.cube(tuple(b - a)).translate(tuple(a))
-    ball = Solid.sphere(edge, 12)
+        return _Manifold.cube(tuple(b - a)).translate(tuple(a))
+    ball = _Manifold.sphere(edge, 12)
     corners = [
         ball.translate(tuple(np.where(side, b - edge, a + edge)))
         for side in np.ndindex(2, 2, 2)
     ]  # fmt: skip
-    return Solid.batch_hull(corners)
+    return _Manifold.batch_hull(corners)
 
 
 def prism(outline: Sequence[Sequence[float]], low: float, high: float) -> Solid:
     """An outline in the x-y plane [mm] extruded from z = ``low`` to z = ``high``."""
     section = manifold3d.CrossSection([[list(p) for p in outline]])
-    return Solid.extrude(section, high - low).translate((0.0, 0.0, low))
+    return _Manifold.extrude(section, high - low).translate((0.0, 0.0, low))
 
 
 def placed(solid: Solid, origin: Array, axis: Array) -> Solid:
@@ -81,7 +85,7 @@ def moved(solid: Solid, rotation: Array, origin: ArrayLike) -> Solid:
 
 def merged(solids: Sequence[Solid]) -> Solid:
     """Union of all."""
-    return Solid.batch_boolean(list(solids), manifold3d.OpType.Add)
+    return _Manifold.batch_boolean(list(solids), manifold3d.OpType.Add)
 
 
 def shell_of(solid: Solid) -> Shell:
@@ -89,16 +93,16 @@ def shell_of(solid: Solid) -> Shell:
     return creased(*arrays_of(solid))
 
 
-def solid_of(vertices: Array, faces: Faces) -> manifold3d.Manifold:
+def solid_of(vertices: Array, faces: Faces) -> Solid:
     """A solid from a closed mesh."""
     mesh = manifold3d.Mesh64(
         vert_properties=np.ascontiguousarray(vertices, np.float64),
         tri_verts=np.ascontiguousarray(faces, np.uint64),
     )
-    return manifold3d.Manifold(mesh)
+    return _Manifold(mesh)
 
 
-def arrays_of(solid: manifold3d.Manifold) -> tuple[Array, Faces]:
+def arrays_of(solid: Solid) -> tuple[Array, Faces]:
     """Vertices (n, 3) and faces (m, 3) of a solid."""
     mesh = solid.to_mesh64()
     return np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts).astype(np.int64)

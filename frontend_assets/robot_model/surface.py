@@ -15,6 +15,8 @@ from frontend_assets.robot_model.solids import arrays_of, rod, solid_of
 _CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 _EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b) in (1, 2, 4)]
 _RELAXATIONS = 6
+_AGREEMENT = 0.85
+"""Cosine between mesh and field normal above which both mean the same face."""
 _CHORD = 0.4
 """How far [mm] a chord of the mesh may run inside the true surface."""
 
@@ -38,7 +40,8 @@ def moulded(
 
     Args:
         field: the shape; what reaches out of the box is cut off somewhere at its sides.
-        low, high: corners of the box [mm]; cuts should lie well inside it.
+        low: lower corner of the box [mm]; cuts should lie well inside it.
+        high: upper corner of the box [mm].
         cuts: planes at which joint faces arise.
         cell: size of the triangles [mm].
     """
@@ -141,7 +144,8 @@ def _with_field_normals(field: Field, shell: Shell, cuts: Sequence[Cut]) -> Shel
         flat = shell.normals @ normal > 0.999
         on_cut |= flat & (np.abs((shell.vertices - np.array(cut.point)) @ normal) < 1e-6)
     on_surface = np.abs(field(shell.vertices)) < _CHORD
-    use = ~on_cut & (length > 0.3) & on_surface
+    agrees = np.einsum("ij,ij->i", slope, shell.normals) > _AGREEMENT * length
+    use = ~on_cut & (length > 0.3) & on_surface & agrees
     normals = shell.normals.copy()
     normals[use] = slope[use] / length[use][:, None]
     return Shell(shell.vertices, normals, shell.faces)
