@@ -50,6 +50,7 @@ from server.link_records import (
 from server.mapped import MappedReadError, MappedRing, MappedSlot
 
 _PATHS_FILE = "paths.json"
+_SMALLEST_QUATERNION = 1e-6
 
 __all__ = ["ControlLink", "WebLink"]
 
@@ -109,14 +110,15 @@ class WebLink:
         """Send a path and start it; returns the number to wait for.
 
         Args:
-            samples: (n, 8), columns time in s, position in m, unit quaternion w, x, y, z.
+            samples: (n >= 2, 8), columns time in s, increasing from 0, position in m, quaternion
+                w, x, y, z.
             name: shown while it plays; :meth:`status` tells it by the record's ``path_id``.
+
+        Raises:
+            InvalidPose: the samples make no path; nothing is sent.
         """
         rows = np.ascontiguousarray(samples, dtype=np.float64)
-        if rows.ndim != 2 or rows.shape[1] != PATH_COLUMNS or len(rows) == 0:
-            raise InvalidPose("path", f"has shape {rows.shape}, not (n, {PATH_COLUMNS})")
-        if not np.isfinite(rows).all():
-            raise InvalidPose("path", "holds NaN or infinity")
+        _check_path(rows)
         with self._lock:
             path_id = max(self._paths, default=0) + 1
             self._write_file(path_file(path_id), rows.tobytes())
@@ -183,7 +185,7 @@ class WebLink:
         if not (np.isfinite(leader["position"]).all() and np.isfinite(leader["wxyz"]).all()):
             raise InvalidPose(f"leader {kind.name}", "the pose holds NaN or infinity")
         norm = float(np.linalg.norm(leader["wxyz"]))
-        if norm < 1e-6:
+        if norm < _SMALLEST_QUATERNION:
             raise InvalidPose(f"leader {kind.name}", "the quaternion is zero")
         leader["wxyz"] /= norm
         with self._lock:
@@ -294,3 +296,15 @@ class WebLink:
         for slot in [*slots, self._alive, *self._leaders.values()]:
             slot.close()
         self._requests.close()
+
+
+def _check_path(rows: NDArray[np.float64]) -> None:
+    """Refuse what cannot be interpolated, before the control process has to."""
+    if rows.ndim != 2 or rows.shape[1] != PATH_COLUMNS or len(rows) < 2:
+        raise InvalidPose("path", f"has shape {rows.shape}, not (two or more, {PATH_COLUMNS})")
+    if not np.isfinite(rows).all():
+        raise InvalidPose("path", "holds NaN or infinity")
+    if rows[0, 0] != 0.0 or not (np.diff(rows[:, 0]) > 0.0).all():
+        raise InvalidPose("path", "its times must start at 0 and increase")
+    if not (np.linalg.norm(rows[:, 4:8], axis=1) > _SMALLEST_QUATERNION).all():
+        raise InvalidPose("path", "holds a zero quaternion")

@@ -109,6 +109,8 @@ class _MappedEntries:
             _create(self.path, dtype, capacity)
         writable = writable or create
         self._map = self._open(writable)
+        if len(self._map) % 8:
+            raise MappedFileError(self.path, "is not a file of such records")
         self._words = memoryview(self._map).cast("Q")
         self._check()
         self._capacity = self._words[_CAPACITY_AT]
@@ -117,7 +119,6 @@ class _MappedEntries:
             self._capacity, self._stride
         )
         self._payloads = self._entries[:, _PREFIX_BYTES : _PREFIX_BYTES + dtype.itemsize]
-        self._writable = writable
 
     def _open(self, writable: bool) -> mmap.mmap:
         try:
