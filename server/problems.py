@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from enum import Enum
 from http import HTTPStatus
@@ -20,7 +19,6 @@ from robot.safety import RequestRefused
 from server.refusals import WebRefusal
 
 MEDIA_TYPE = "application/problem+json"
-_log = logging.getLogger("keyhole.web")
 _LONGEST_TEXT = 200
 _MOST_ERRORS = 20
 
@@ -57,7 +55,7 @@ def problem(status: int, code: str, detail: str, data: dict[str, Any] | None = N
     """A problem document as a dictionary."""
     title = HTTPStatus(status).phrase
     core = {"type": "about:blank", "title": title, "status": status, "detail": detail, "code": code}
-    return {**{k: _plain(v) for k, v in (data or {}).items() if k not in core}, **core}
+    return {**core, **{k: _plain(v) for k, v in (data or {}).items() if k not in core}}
 
 
 def problem_of(error: KeyholeError) -> Any:
@@ -110,6 +108,5 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(Exception)
     async def _(request: Request, error: Exception) -> Response:
-        _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
         detail = "the server failed on this request; its log says more"
         return response(problem(500, "internal_error", detail))

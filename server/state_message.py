@@ -127,6 +127,20 @@ class StateMessages:
             list(pair) for pair in zip(_degrees(lower), _degrees(upper), strict=True)
         ]
 
+        self._unknown = np.zeros(1, RECORD)
+        self._set_configured(self._unknown["input"]["settings"], configuration)
+
+    @staticmethod
+    def _set_configured(settings: NDArray[Any], configuration: Configuration) -> None:
+        """What will be in force when control starts, so that the page shows no false choice."""
+        priority, teleoperation = configuration.priority, configuration.teleoperation
+        settings["case"] = CASE_NAMES[priority.case]
+        settings["solver"] = next(s for s, name in SOLVERS.items() if name == priority.solver)
+        settings["coordinates"] = Coordinates[priority.coordinates.upper()]
+        settings["alignment"] = Alignment[teleoperation.alignment.upper()]
+        settings["hold_to_move"] = teleoperation.hold_to_move
+        settings["motion_scale"] = teleoperation.motion_scale
+
     def message(
         self, record: NDArray[Any] | None, around: Surroundings, operator: OperatorView
     ) -> dict[str, Any]:
@@ -137,10 +151,11 @@ class StateMessages:
             around: what is known beside the record.
             operator: who drives, seen by the reader.
         """
-        known = np.zeros(1, RECORD) if record is None else record
+        known = self._unknown if record is None else record
         body = self._body(known[0], around)
         if record is None:
-            body = {**_nulled(body), "joint_limits_deg": self._joint_limits}
+            configured = ("priority", "teleoperation", "bend_limit_deg", "joint_limits_deg")
+            body = {**_nulled(body), **{name: body[name] for name in configured}}
         return {
             "type": "state",
             "schema_version": MESSAGE_SCHEMA_VERSION,
@@ -234,7 +249,7 @@ def _safety(record: np.void, around: Surroundings) -> dict[str, str]:
     if around.control != "running":
         code = f"control_{around.control}"
         reason = around.control_words or f"control is {around.control}"
-        action = "wait a moment" if around.control == "starting" else "start Keyhole again"
+        action = "wait; if it does not come back, read what keyhole printed"
     return {
         "state": Safety(int(state["safety"])).name,
         "reason": reason,

@@ -147,7 +147,7 @@ class StateSource:
         status, now = self.status(), self._clock_ns()
         control, words = str(status["control"]), ""
         if control != "running":
-            words = f"control is {control}: {status['message']}"
+            words = str(status["message"]) or f"control is {control}"
         elif record is None:
             control, words = "starting", "control is starting"
         elif now - int(record["header"]["stamp_ns"][0]) > SILENT_NS:

@@ -87,7 +87,7 @@ class ViserFilter:
     """Decides on the messages of one browser, in their order."""
 
     def __init__(self) -> None:
-        self._dragged: set[str] = set()
+        self._dragged: dict[str, TransformControlsDragEndMessage] = {}
 
     def passes(self, frame: bytes, is_operator: bool) -> bool:
         """Whether ``frame`` may go on to viser.
@@ -105,14 +105,22 @@ class ViserFilter:
         match message:
             case TransformControlsDragStartMessage():
                 if is_operator:
-                    self._dragged.add(message.name)
+                    end = TransformControlsDragEndMessage(message.name, message.owner)
+                    self._dragged[message.name] = end
                 return is_operator
             case TransformControlsUpdateMessage():
                 return is_operator and _is_pose(message)
             case TransformControlsDragEndMessage():
                 # The end of a drag that was let through ends it for viser too, lease or not.
-                known = message.name in self._dragged
-                self._dragged.discard(message.name)
-                return known or is_operator
+                return self._dragged.pop(message.name, None) is not None or is_operator
             case _:
                 return True
+
+    def ends_of_drags(self) -> list[bytes]:
+        """Frames that let go, once, every gizmo that the browser holds.
+
+        For a browser that has lost the lease: viser would go on holding the gizmo for it.
+        """
+        frames = [msgspec.msgpack.encode(end) for end in self._dragged.values()]
+        self._dragged.clear()
+        return frames

@@ -32,6 +32,7 @@ LARGEST_UPSTREAM = 50 * 1024 * 1024
 _PROTOCOL_PREFIX = "viser-v"
 _TRY_AGAIN = 1013
 _GOING_AWAY = 1001
+_LEASE_WATCH_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -75,25 +76,43 @@ async def _down(upstream: ClientConnection, websocket: WebSocket) -> None:
             await websocket.send_bytes(frame)
 
 
-async def _up(upstream: ClientConnection, websocket: WebSocket, services: Services) -> None:
-    """From the browser only what passes the filter goes to viser."""
-    allowed = ViserFilter()
-    caller = caller_of(websocket.scope)
-    while True:
-        message = await websocket.receive()
-        if message["type"] == "websocket.disconnect":
-            return
-        frame = message.get("bytes")
-        if frame and allowed.passes(frame, services.lease.is_held_by(caller)):
-            await upstream.send(frame)
+class _Upward:
+    """From the browser to viser: only what the filter lets pass."""
+
+    def __init__(
+        self, upstream: ClientConnection, websocket: WebSocket, services: Services
+    ) -> None:
+        self._upstream, self._websocket = upstream, websocket
+        self._lease, self._caller = services.lease, caller_of(websocket.scope)
+        self._filter = ViserFilter()
+
+    async def pass_on(self) -> None:
+        """Pass messages on until the browser goes."""
+        while True:
+            message = await self._websocket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            frame = message.get("bytes")
+            if frame and self._filter.passes(frame, self._lease.is_held_by(self._caller)):
+                await self._upstream.send(frame)
+
+    async def end_lost_drags(self) -> None:
+        """Let go what the browser drags when it loses the lease."""
+        while True:
+            await asyncio.sleep(_LEASE_WATCH_S)
+            if not self._lease.is_held_by(self._caller):
+                for frame in self._filter.ends_of_drags():
+                    await self._upstream.send(frame)
 
 
 async def _pass_through(
     upstream: ClientConnection, websocket: WebSocket, services: Services
 ) -> None:
+    upward = _Upward(upstream, websocket, services)
     tasks = [
         asyncio.create_task(_down(upstream, websocket)),
-        asyncio.create_task(_up(upstream, websocket, services)),
+        asyncio.create_task(upward.pass_on()),
+        asyncio.create_task(upward.end_lost_drags()),
     ]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
