@@ -40,7 +40,7 @@ GAP = 0.7
 """Half of the groove between two links [mm]."""
 DEPTH = 1.2
 """How far the groove's dark bottom lies below the surface [mm]."""
-CELL = 5.5
+CELL = 6.0
 """Size of the triangles on the round bodies [mm]."""
 
 
@@ -131,7 +131,7 @@ def _link5() -> Parts:
     neck = limb(line, [26, 33, 35.5, 36, 36.5])
     hollow = union(above((0, 45, 0), (0, 1, 0)), above((0, 0, -88), (0, 1, -1)))
     inside = common(neck, hollow, 14)
-    stub = drum((0, 10, 0), (0, 70, 0), 36.8, 4)
+    stub = drum((0, 10, 0), (0, 50, 0), 36.8, 3)
     field = melt(melt(lobe, inside, 26), stub, 8)
     cuts = [_cut((0, 0, -173), (0, 0, -1), 60)]
     shell = moulded(field, (-55, -55, -200), (55, 98, 50), cuts, CELL)
