@@ -50,11 +50,12 @@ def named_view(
     forward = forward / length if length > 1e-3 else np.array([1.0, 0.0, 0.0])
     sideways = np.cross(forward, up)
     if name == ALONG:
+        # Below the wall, as an endoscope through a second port would see it.
         look_at = tip + 0.02 * inward
-        return View(trocar - 0.05 * inward + 0.07 * sideways + 0.05 * up, look_at)
+        return View(trocar + 0.012 * inward + 0.06 * sideways - 0.006 * up, look_at)
     # The middle leans toward the tip: that is where the work is.
     look_at = 0.5 * trocar + 0.5 * tip
-    return View(look_at + 0.36 * sideways + 0.34 * forward + 0.16 * up, look_at)
+    return View(look_at + 0.31 * sideways + 0.30 * forward + 0.14 * up, look_at)
 
 
 class SceneCamera:

@@ -37,7 +37,7 @@ class SceneGhost:
             bar.vertices,
             bar.faces,
             color=DESIRED,
-            opacity=0.45,
+            opacity=0.55,
             cast_shadow=False,
             receive_shadow=False,
         )

@@ -9,7 +9,7 @@ from server.scene_shapes import round_bar
 
 FLOOR = -0.16
 """Height of the floor (m): below everything the tip reaches through the default trocar."""
-PLINTH_RADIUS = 0.10
+PLINTH_RADIUS = 0.08
 
 
 class SceneGround:
@@ -29,8 +29,8 @@ class SceneGround:
             section_size=0.25,
             cell_color=GRID_CELL,
             section_color=GRID_SECTION,
-            cell_thickness=0.6,
-            section_thickness=1.0,
+            cell_thickness=0.5,
+            section_thickness=0.8,
             fade_distance=4.0,
             fade_strength=1.5,
             shadow_opacity=0.15,

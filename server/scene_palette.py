@@ -13,14 +13,15 @@ COMMANDED: Colour = (138, 92, 214)
 MEASURED: Colour = (217, 138, 0)
 TRUE: Colour = (31, 157, 107)
 
-TENDONS: tuple[Colour, ...] = ((224, 62, 54), (240, 186, 22), (20, 160, 190), (200, 70, 180))
+# The scene's light is strong: solid bodies come out lighter than what stands here.
+TENDONS: tuple[Colour, ...] = ((190, 22, 18), (205, 140, 0), (0, 110, 150), (140, 20, 130))
 """Tendons 1 to 4, at 0, 90, 180 and 270 degrees about the segment's z axis."""
 
-BACKBONE: Colour = (96, 102, 112)
-DISK: Colour = (176, 182, 192)
+BACKBONE: Colour = (52, 56, 64)
+DISK: Colour = (112, 118, 130)
 PORT: Colour = (54, 64, 80)
-WALL: Colour = (226, 152, 132)
+WALL: Colour = (206, 108, 88)
 RCM: Colour = (214, 40, 90)
-PLINTH: Colour = (120, 127, 138)
-GRID_CELL: Colour = (168, 174, 184)
-GRID_SECTION: Colour = (128, 135, 147)
+PLINTH: Colour = (136, 142, 152)
+GRID_CELL: Colour = (150, 155, 165)
+GRID_SECTION: Colour = (122, 128, 140)

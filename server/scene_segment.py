@@ -19,9 +19,9 @@ ROOT = "/instrument"
 BEND_RESOLUTION = 1e-4
 """Changes of (u, v) smaller than this (rad) are not sent: 3 micrometres at the tip."""
 POSITION_RESOLUTION = 5e-6
-DISK_SHARE = 0.42
+DISK_SHARE = 0.36
 """Thickness of a disk as a share of the distance between two."""
-TENDON_WIDTH = 2.0
+TENDON_WIDTH = 2.4
 """The tendons are drawn this many times thicker than they are, to be seen at arm's length."""
 OVERLAP = 1.16
 """Pieces of tendon are drawn longer than the distance between two disks, so that they meet inside
