@@ -27,6 +27,7 @@ export async function call(method, path, body) {
   if (body !== undefined) headers["Content-Type"] = "application/json";
   if (leaseId !== null) headers["X-Keyhole-Lease"] = leaseId;
   let answer;
+  let text;
   try {
     answer = await fetch(path, {
       method,
@@ -36,12 +37,12 @@ export async function call(method, path, body) {
       cache: "no-store",
       signal: AbortSignal.timeout(TIMEOUT_MS),
     });
+    text = await answer.text();
   } catch (cause) {
     const late = cause.name === "TimeoutError";
     const detail = late ? "The server did not answer in time." : "The server cannot be reached.";
     throw new Refusal({ detail, code: "unreachable" }, 0);
   }
-  const text = await answer.text();
   const content = parse(text);
   if (!answer.ok) throw new Refusal(typeof content === "object" && content ? content : {}, answer.status);
   return content;

@@ -22,7 +22,7 @@ const LEADERS = { none: "none", gizmo: "gizmo", api_pose: "API, relative pose", 
 
 window.keyhole = { state: null };
 
-const stream = new StateStream({ onState: take, onLink });
+const stream = new StateStream({ onState: take, onLink, onProblem });
 const motion = new Motion(stream, take);
 const settings = new Settings();
 const paths = new Paths();
@@ -79,6 +79,11 @@ function onLink(change) {
     configure();
   }
   show();
+}
+
+/** Who drives is on the page already. */
+function onProblem({ code, detail }) {
+  if (code !== "not_the_operator") refuse(detail);
 }
 
 async function configure() {

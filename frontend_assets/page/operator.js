@@ -72,7 +72,8 @@ function remembered() {
     // Storage may be forbidden.
   }
   if (name) return name;
-  const fresh = `Operator ${10 + Math.floor(Math.random() * 90)}`;
+  // Two browsers must not have one name, or neither could hand over to the other.
+  const fresh = `Operator ${1000 + Math.floor(Math.random() * 9000)}`;
   remember(fresh);
   return fresh;
 }

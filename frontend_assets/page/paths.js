@@ -14,6 +14,7 @@ export class Paths {
     onPress(byId("play"), () => this.#play({ experiment: byId("experiment").value }), refuse);
     onPress(byId("stop-path"), () => attempt(call("DELETE", `${ROBOT}/path`)), refuse);
     byId("csv").addEventListener("change", () => this.#playFile(byId("csv").files[0]));
+    byId("experiment").addEventListener("change", () => this.#describe());
     this.#startDrop();
     this.load();
   }
@@ -27,11 +28,17 @@ export class Paths {
     } catch {
       return;
     }
-    for (const { name, title, duration_s } of experiments) {
+    for (const { name, title } of experiments) {
       this.titles.set(name, title);
-      const words = duration_s ? `${title} (${Math.round(duration_s)} s)` : title;
-      byId("experiment").append(make("option", "", words, { value: name }));
+      byId("experiment").append(make("option", "", title, { value: name }));
     }
+    this.#describe();
+  }
+
+  /** A long title is cut short in the list; the tooltip has it whole. */
+  #describe() {
+    const list = byId("experiment");
+    setData(list, "tip", `Path to be played from the present pose: ${this.titles.get(list.value)}`);
   }
 
   async #play(path) {

@@ -8,17 +8,24 @@ const LONGEST_WAIT_MS = 4000;
 const HEARTBEAT_MS = 250;
 const RENEW_MS = 1000;
 const SILENCE_MS = 2500;
+const ASLEEP_MS = 1000;
 
 export class StateStream {
-  /** `onState(message)` for every state; `onLink({up, reason, retryAt})` when the link changes. */
-  constructor({ onState, onLink }) {
+  /**
+   * `onState(message)` for every state; `onLink({up, reason, retryAt})` when the link changes;
+   * `onProblem(problem)` for a message of ours that the server refused.
+   */
+  constructor({ onState, onLink, onProblem }) {
     this.onState = onState;
     this.onLink = onLink;
+    this.onProblem = onProblem;
     this.socket = null;
     this.up = false;
     this.holding = false;
     this.driving = false;
     this.lastMessage = 0;
+    this.lastBeat = 0;
+    this.tick = null;
     this.wait = FIRST_WAIT_MS;
     this.timer = null;
     setInterval(() => this.#beat(), HEARTBEAT_MS);
@@ -32,6 +39,7 @@ export class StateStream {
     const socket = new WebSocket(`${scheme}://${location.host}${ROBOT}/stream?rate_hz=30`);
     this.socket = socket;
     this.lastMessage = performance.now();
+    this.tick = null;
     socket.onmessage = (event) => this.#take(socket, event.data);
     socket.onclose = () => this.#lost(socket);
   }
@@ -58,7 +66,10 @@ export class StateStream {
       this.up = true;
       this.onLink({ up: true, reason: "", retryAt: 0 });
     }
-    if (message.type === "state") this.onState(message);
+    if (message.type === "problem") this.onProblem(message.problem);
+    if (message.type !== "state") return;
+    this.tick = message.tick;
+    this.onState(message);
   }
 
   #lost(socket) {
@@ -84,14 +95,19 @@ export class StateStream {
   }
 
   #beat() {
-    if (this.socket?.readyState === WebSocket.OPEN && performance.now() - this.lastMessage > SILENCE_MS) {
+    const now = performance.now();
+    // After a sleep of the whole page, silence says nothing about the server.
+    const awake = now - this.lastBeat < ASLEEP_MS;
+    this.lastBeat = now;
+    if (awake && this.socket?.readyState === WebSocket.OPEN && now - this.lastMessage > SILENCE_MS) {
       const silent = this.socket;
       silent.onclose = null;
       silent.close();
       this.#lost(silent);
       return;
     }
-    this.send({ type: "heartbeat" });
+    // The tick tells the server how far we are, so that it sends no backlog.
+    this.send(this.tick === null ? { type: "heartbeat" } : { type: "heartbeat", tick: this.tick });
     if (this.holding) this.send({ type: "hold", down: true });
   }
 
