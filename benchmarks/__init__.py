@@ -1,0 +1,1 @@
+"""Speed and lateness, beside a peer in the same run."""

@@ -1,0 +1,1 @@
+"""What the browser is given: the operator page, the URDF and the meshes."""

@@ -1,0 +1,1 @@
+"""Everything with a wire, or a simulated wire, behind the interfaces Plant and Leader."""

@@ -1,4 +1,4 @@
-"""The exact kinematic plant: goes where it is told, at once. For tests and figures of the algebra."""
+"""The exact kinematic plant: goes where it is told, at once. For tests of the algebra."""
 
 from __future__ import annotations
 

@@ -36,10 +36,9 @@ def cache_directory() -> Path:
     return root / digest.hexdigest()[:16]
 
 
-numba.config.CACHE_DIR = str(cache_directory())
+numba.config.CACHE_DIR = str(cache_directory())  # type: ignore[attr-defined]
 
 
 def compiled(function: _Function) -> _Function:
     """Compile ``function`` on first use, with the cache above and IEEE arithmetic kept exact."""
     return cast(_Function, numba.njit(cache=True, fastmath=False, error_model="numpy")(function))
-

@@ -240,7 +240,7 @@ class Configuration(Section):
         return self
 
     def hash64(self) -> int:
-        """First 63 bits of the SHA-256 of the canonical JSON form: the mark every record carries."""
+        """First 63 bits of the SHA-256 of the canonical JSON: the mark every record carries."""
         digest = hashlib.sha256(self.model_dump_json().encode()).digest()
         return int.from_bytes(digest[:8], "big") >> 1
 

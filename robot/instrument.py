@@ -16,7 +16,7 @@ from robot.segment import tip_position, tip_rotation
 
 ROWS = 10
 RCM_ROWS, LINEAR_ROWS, POINTING_ROWS, ROLL_ROWS, LAMBDA_ROWS = (
-    range(0, 3),
+    range(3),
     range(3, 6),
     range(6, 8),
     range(8, 9),
@@ -141,7 +141,7 @@ def rcm_jacobian(
 def project_on_shaft(
     point: np.ndarray, shaft_base: np.ndarray, shaft_end: np.ndarray
 ) -> tuple[float, float]:
-    """Where ``point`` (3,), m, stands along the shaft (0 base, 1 end), and its distance from it, m."""
+    """Where ``point`` (3,), m, stands along the shaft (0 base, 1 end); its distance from it, m."""
     length_squared = 0.0
     along = 0.0
     for i in range(3):

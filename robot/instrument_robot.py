@@ -6,259 +6,57 @@ teleoperation, commands, priority, integration, kinematics.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from robot.arm import Arm
-from robot.commands import tip_twist
-from robot.compiled import compiled
 from robot.configuration import Configuration
-from robot.instrument import project_on_shaft, rcm_jacobian, shaft, tip, tip_jacobian
+from robot.instrument_tick import (
+    SOLVE_CLOSED_FORM,
+    SOLVE_QP,
+    conclude,
+    copy_joints,
+    decide_and_prepare,
+    integrate,
+)
 from robot.parameters import parameters
 from robot.priority.closed_form import augmented, polar_columns, prioritized
-from robot.priority.levels import PRESETS, assemble, plan
+from robot.priority.levels import PRESETS, Plan, plan
 from robot.priority.lexicographic import LexicographicProblem, error_damping
-from robot.priority.limits import active_limits, rate_limits, share_within
-from robot.records import OUTCOME, Case, Coordinates, Safety, Solver
-from robot.rotations import angle_between, quaternion_from_matrix
-from robot.safety import Event, apply_event, decide
-from robot.segment import polar
+from robot.priority.limits import share_within
+from robot.records import INPUT, OUTCOME, Case, Coordinates, Solver
 from robot.start import start_configuration
-from robot.teleoperation import follow
-from robot.tendons import servo_angles
 from robot.urdf import urdf_text
 
-_ENABLED = int(Safety.ENABLED)
-_SOLVER_FAILED = int(Event.SOLVER_FAILED)
-_HQP, _AUGMENTED = int(Solver.HQP), int(Solver.AUGMENTED)
-_BALANCED = int(Case.BALANCED)
-_POLAR = int(Coordinates.POLAR)
+
+class _Plans:
+    """The presets as padded arrays, so that the compiled tick picks one by its number."""
+
+    def __init__(self, plans: tuple[Plan, ...]) -> None:
+        count = len(plans)
+        self.sizes = np.zeros((count, 2), dtype=np.int64)
+        self.rows = np.zeros((count, 10), dtype=np.int64)
+        self.weights = np.zeros((count, 10))
+        self.starts = np.zeros((count, 11), dtype=np.int64)
+        for index, one in enumerate(plans):
+            rows, levels = len(one.rows), len(one.starts) - 1
+            self.sizes[index] = rows, levels
+            self.rows[index, :rows] = one.rows
+            self.weights[index, :rows] = one.weights
+            self.starts[index, : levels + 1] = one.starts
 
 
-class Work:
+class _Work:
     """Memory that a tick writes over and never reads from the tick before."""
 
     def __init__(self) -> None:
         self.catalogue = np.zeros((10, 10))
         self.targets = np.zeros(10)
         self.preferred = np.zeros(10)
-        self.previous_position = np.zeros(3)
-        self.previous_rotation = np.zeros((3, 3))
-
-
-@compiled
-def _begin(
-    state: np.ndarray,
-    tick_input: np.ndarray,
-    parameters: np.ndarray,
-    outcome: np.ndarray,
-    previous_position: np.ndarray,
-    previous_rotation: np.ndarray,
-) -> bool:
-    """Copy the state, apply safety and teleoperation; True if the robot shall move."""
-    source = state.view(np.float64)
-    target = outcome.view(np.float64)
-    for i in range(target.size):
-        target[i] = 0.0
-    for i in range(source.size):
-        target[i] = source[i]
-    s = outcome[0].state
-    s.tick += 1
-    for i in range(3):
-        previous_position[i] = s.desired_position[i]
-        for j in range(3):
-            previous_rotation[i, j] = s.desired_rotation[i, j]
-    just_enabled = decide(outcome, tick_input, parameters)
-    engaged = follow(outcome, tick_input, parameters)
-    if just_enabled or s.safety != _ENABLED:
-        return False
-    if engaged:
-        return True
-    speed = 0.0
-    for i in range(3):
-        speed += abs(tick_input[0].trocar_velocity[i])
-    return speed > 0.0
-
-
-@compiled
-def _tasks(
-    outcome: np.ndarray,
-    tick_input: np.ndarray,
-    parameters: np.ndarray,
-    previous_position: np.ndarray,
-    previous_rotation: np.ndarray,
-    catalogue: np.ndarray,
-    targets: np.ndarray,
-    preferred: np.ndarray,
-) -> tuple[float, float]:
-    """Fill the catalogue of task rows, their wanted rates, and the preferred rates.
-
-    Returns the tip's position error (m) and orientation error (rad) left over from the last tick.
-    """
-    s = outcome[0].state
-    i_ = tick_input[0]
-    p = parameters[0]
-    base = np.empty(3)
-    end = np.empty(3)
-    rotation = np.empty((3, 3))
-    shaft(s.arm_position, s.arm_rotation, parameters, base, end, rotation)
-    rcm_jacobian(s.arm_jacobian, base, end, s.x[9], catalogue[0:3])
-    jacobian = np.empty((6, 10))
-    tip_jacobian(
-        s.arm_jacobian, rotation, s.tip_position, s.x[7], s.x[8], p.segment_length, jacobian
-    )
-    twist = outcome[0].report.twist
-    tip_twist(
-        s.desired_position,
-        s.desired_rotation,
-        previous_position,
-        previous_rotation,
-        s.tip_position,
-        s.tip_rotation,
-        i_.dt_s,
-        i_.settings.feed_forward != 0 and s.engaged != 0,
-        i_.settings.case == _BALANCED or i_.settings.solver == _AUGMENTED,
-        parameters,
-        twist,
-    )
-    gain = min(p.rcm_gain, 0.5 / i_.dt_s)
-    for i in range(3):
-        point = base[i] + s.x[9] * (end[i] - base[i])
-        targets[i] = i_.trocar_velocity[i] + gain * (i_.trocar_position[i] - point)
-        targets[3 + i] = twist[i]
-        targets[6 + i] = 0.0
-        for j in range(3):
-            targets[6 + i] += s.tip_rotation[j, i] * twist[3 + j]
-        for k in range(10):
-            catalogue[3 + i, k] = jacobian[i, k]
-            angular = 0.0
-            for j in range(3):
-                angular += s.tip_rotation[j, i] * jacobian[3 + j, k]
-            catalogue[6 + i, k] = angular
-    for k in range(10):
-        catalogue[9, k] = 0.0
-        preferred[k] = 0.0
-    catalogue[9, 9] = 1.0
-    targets[9] = p.lambda_gain * (i_.settings.lambda_reference - s.x[9])
-    if s.engaged != 0:
-        preferred[9] = targets[9]
-        for k in range(7):
-            reach = p.joint_upper[k] - p.joint_lower[k]
-            middle = 0.5 * (p.joint_upper[k] + p.joint_lower[k])
-            # Steepest descent of sum ((q - middle) / reach)^2 / 2, scaled to rad/s.
-            preferred[k] = -p.posture_gain * (s.x[k] - middle) * (math.pi / reach) ** 2
-    square = 0.0
-    for i in range(3):
-        square += (previous_position[i] - s.tip_position[i]) ** 2
-    return math.sqrt(square), angle_between(previous_rotation, s.tip_rotation)
-
-
-@compiled
-def _prepare(
-    outcome: np.ndarray,
-    tick_input: np.ndarray,
-    parameters: np.ndarray,
-    catalogue: np.ndarray,
-    targets: np.ndarray,
-    preferred: np.ndarray,
-    rows: np.ndarray,
-    weights: np.ndarray,
-    starts: np.ndarray,
-    matrix: np.ndarray,
-    upper: np.ndarray,
-    lower: np.ndarray,
-    linear: np.ndarray,
-) -> None:
-    """Write the QP: bounds of the rates, the bend row, the equalised levels, the preference."""
-    upper[10] = rate_limits(
-        outcome[0].state.x, tick_input[0].dt_s, parameters, lower, upper, matrix[0]
-    )
-    assemble(catalogue, targets, rows, weights, starts, matrix[1:], upper[11:])
-    for r in range(rows.size):
-        lower[11 + r] = upper[11 + r]
-    for k in range(10):
-        linear[k] = -preferred[k]
-
-
-@compiled
-def _integrate(
-    outcome: np.ndarray,
-    dt: float,
-    rates: np.ndarray,
-    catalogue: np.ndarray,
-    targets: np.ndarray,
-    lower: np.ndarray,
-    upper: np.ndarray,
-    bend_row: np.ndarray,
-    bend_bound: float,
-    parameters: np.ndarray,
-) -> None:
-    """Move x by the rates and note what the levels and limits left over."""
-    s = outcome[0].state
-    report = outcome[0].report
-    for k in range(10):
-        # The solver keeps the box to its tolerance only; this takes out no more than that.
-        rates[k] = min(max(rates[k], lower[k]), upper[k])
-    report.limits_active = active_limits(
-        s.x, rates, lower, upper, bend_row, bend_bound, parameters
-    )
-    residual = np.zeros(3)
-    for level in range(3):
-        for i in range(3 * level, 3 * level + 3):
-            achieved = 0.0
-            for k in range(10):
-                achieved += catalogue[i, k] * rates[k]
-            residual[level] += (targets[i] - achieved) ** 2
-    report.residual_rcm = math.sqrt(residual[0])
-    report.residual_linear = math.sqrt(residual[1])
-    report.residual_angular = math.sqrt(residual[2])
-    for k in range(10):
-        report.x_dot[k] = rates[k]
-        s.x[k] += dt * rates[k]
-    outcome[0].command.moving = 1
-
-
-@compiled
-def _conclude(
-    outcome: np.ndarray,
-    arm_position: np.ndarray,
-    arm_rotation: np.ndarray,
-    arm_jacobian: np.ndarray,
-    trocar: np.ndarray,
-    parameters: np.ndarray,
-) -> None:
-    """Forward kinematics of the new x into the state, and the command and report that follow."""
-    s = outcome[0].state
-    p = parameters[0]
-    for i in range(3):
-        s.arm_position[i] = arm_position[i]
-        for j in range(3):
-            s.arm_rotation[i, j] = arm_rotation[i, j]
-    for i in range(6):
-        for j in range(7):
-            s.arm_jacobian[i, j] = arm_jacobian[i, j]
-    base = np.empty(3)
-    end = np.empty(3)
-    rotation = np.empty((3, 3))
-    shaft(s.arm_position, s.arm_rotation, parameters, base, end, rotation)
-    tip(end, rotation, s.x[7], s.x[8], p.segment_length, s.tip_position, s.tip_rotation)
-    if s.engaged == 0:
-        if outcome[0].command.moving == 0:
-            s.x[9] = project_on_shaft(trocar, base, end)[0]
-            s.desired_position[:] = s.tip_position
-            s.desired_rotation[:] = s.tip_rotation
-    command = outcome[0].command
-    servo_angles(s.x[7], s.x[8], p.pitch_radius, p.pulley_radius, command.servo)
-    report = outcome[0].report
-    for i in range(7):
-        command.q[i] = s.x[i]
-    report.x[:] = s.x
-    report.theta, report.delta = polar(s.x[7], s.x[8])
-    report.desired_position[:] = s.desired_position
-    report.commanded_position[:] = s.tip_position
-    quaternion_from_matrix(s.desired_rotation, report.desired_wxyz)
-    quaternion_from_matrix(s.tip_rotation, report.commanded_wxyz)
+        self.matrix = np.zeros((11, 10))
+        self.upper = np.zeros(21)
+        self.lower = np.full(21, -1e30)
+        self.left_over = np.zeros(2)
+        self.q = np.zeros(7)
 
 
 class InstrumentRobot:
@@ -272,29 +70,27 @@ class InstrumentRobot:
     name = "instrument"
 
     def __init__(self, configuration: Configuration) -> None:
+        """Build the models and find the start; raises ``UnreachableStart``."""
         self.configuration = configuration
         self.parameters = parameters(configuration)
         self._arm = Arm(urdf_text(configuration))
-        self._work = Work()
+        self._work = _Work()
         length = configuration.priority.characteristic_length_m
+        plans = tuple(plan(PRESETS[case], length) for case in Case)
+        self._plans = _Plans(plans)
         self._problems = tuple(
-            LexicographicProblem(plan(PRESETS[case], length)) for case in Case
+            LexicographicProblem(one, self._work.matrix, self._work.upper, self._work.lower)
+            for one in plans
         )
         self._start = start_configuration(configuration, self._arm, self.parameters)
 
     def initial_state(self, x: np.ndarray | None = None) -> np.ndarray:
         """The (1,) state in which the robot wakes up: DISABLED at the start, or at ``x`` (10,)."""
-        outcome = np.zeros(1, OUTCOME)
-        state = outcome["state"]
-        state["x"] = self._start if x is None else x
-        trocar = np.array(self.configuration.trocar.position_m)
-        self._arm.update(state["x"][0, :7])
-        self._conclude(outcome, trocar)
+        outcome, tick_input = np.zeros(1, OUTCOME), np.zeros(1, INPUT)
+        outcome["state"]["x"] = self._start if x is None else x
+        tick_input["trocar_position"] = self.configuration.trocar.position_m
+        self._conclude(outcome, tick_input)
         return np.asarray(outcome["state"].copy())
-
-    def _conclude(self, outcome: np.ndarray, trocar: np.ndarray) -> None:
-        arm = self._arm
-        _conclude(outcome, arm.position, arm.rotation, arm.jacobian, trocar, self.parameters)
 
     def tick(self, state: np.ndarray, tick_input: np.ndarray, outcome: np.ndarray) -> None:
         """One step: decide, command, solve, integrate.
@@ -304,88 +100,67 @@ class InstrumentRobot:
             tick_input: (1,) ``INPUT``.
             outcome: (1,) ``OUTCOME``, filled: next state, command, report.
         """
-        work = self._work
-        moving = _begin(
+        work, plans = self._work, self._plans
+        left = decide_and_prepare(
             state,
             tick_input,
             self.parameters,
             outcome,
-            work.previous_position,
-            work.previous_rotation,
+            plans.sizes,
+            plans.rows,
+            plans.weights,
+            plans.starts,
+            work.catalogue,
+            work.targets,
+            work.preferred,
+            work.matrix,
+            work.upper,
+            work.lower,
+            work.left_over,
         )
-        if moving:
-            self._move(tick_input, outcome)
-        # A view into the record costs more than the kinematics; x has its own buffer.
-        self._arm.update(outcome["state"]["x"][0, :7])
-        self._conclude(outcome, tick_input["trocar_position"][0])
+        if left >= SOLVE_CLOSED_FORM:
+            rates = self._closed_form(left - SOLVE_CLOSED_FORM, tick_input, outcome)
+            self._integrate(tick_input, outcome, 1, rates)
+        elif left >= SOLVE_QP:
+            damping = error_damping(work.left_over[0], work.left_over[1])
+            rates, status = self._problems[left].solve(work.preferred, damping)
+            self._integrate(tick_input, outcome, status, rates)
+        self._conclude(outcome, tick_input)
 
-    def _move(self, tick_input: np.ndarray, outcome: np.ndarray) -> None:
+    def _integrate(
+        self, tick_input: np.ndarray, outcome: np.ndarray, status: int, rates: np.ndarray
+    ) -> None:
         work = self._work
-        distance, angle = _tasks(
+        integrate(
             outcome,
             tick_input,
-            self.parameters,
-            work.previous_position,
-            work.previous_rotation,
-            work.catalogue,
-            work.targets,
-            work.preferred,
-        )
-        settings = tick_input["settings"][0]
-        problem = self._problems[settings["case"]]
-        _prepare(
-            outcome,
-            tick_input,
-            self.parameters,
-            work.catalogue,
-            work.targets,
-            work.preferred,
-            problem.plan.rows,
-            problem.plan.weights,
-            problem.plan.starts,
-            problem.matrix,
-            problem.upper,
-            problem.lower,
-            problem.preferred,
-        )
-        if settings["solver"] == _HQP:
-            rates, flag = problem.solve(error_damping(distance, angle))
-        else:
-            rates, flag = self._closed_form(settings, problem, outcome), 1
-        if flag <= 0 or not np.isfinite(rates).all():
-            apply_event(outcome, _SOLVER_FAILED)
-            outcome["report"]["solver_status"] = flag if flag <= 0 else -100
-            return
-        _integrate(
-            outcome,
-            tick_input["dt_s"][0],
+            status,
             rates,
             work.catalogue,
             work.targets,
-            problem.lower,
-            problem.upper,
-            problem.matrix[0],
-            problem.upper[10],
+            work.lower,
+            work.upper,
+            work.matrix[0],
             self.parameters,
         )
 
-    def _closed_form(
-        self, settings: np.void, problem: LexicographicProblem, outcome: np.ndarray
-    ) -> np.ndarray:
-        work = self._work
-        x = outcome["state"]["x"][0]
-        change = polar_columns(x[7], x[8]) if settings["coordinates"] == _POLAR else np.eye(10)
-        catalogue = work.catalogue @ change
-        preferred = work.preferred.copy()
-        if settings["coordinates"] == _POLAR:
-            preferred[7:9] = 0.0
-        if settings["solver"] == _AUGMENTED:
-            rates = augmented(catalogue, work.targets, preferred)
-        else:
-            rates = prioritized(problem.plan, catalogue, work.targets, preferred)
-        rates = change @ rates
-        share = share_within(
-            rates, problem.lower, problem.upper, problem.matrix[0], float(problem.upper[10])
-        )
-        return np.asarray(share * rates)
+    def _conclude(self, outcome: np.ndarray, tick_input: np.ndarray) -> None:
+        arm, q = self._arm, self._work.q
+        copy_joints(outcome, q)
+        arm.update(q)
+        conclude(outcome, tick_input, arm.position, arm.rotation, arm.jacobian, self.parameters)
 
+    def _closed_form(self, case: int, tick_input: np.ndarray, outcome: np.ndarray) -> np.ndarray:
+        work, settings = self._work, tick_input["settings"][0]
+        x = outcome["state"]["x"][0]
+        polar = settings["coordinates"] == Coordinates.POLAR
+        change = polar_columns(x[7], x[8]) if polar else np.eye(10)
+        catalogue = work.catalogue @ change
+        if settings["solver"] == Solver.AUGMENTED:
+            rates = augmented(catalogue, work.targets, work.preferred)
+        else:
+            rates = prioritized(self._problems[case].plan, catalogue, work.targets, work.preferred)
+        rates = change @ rates
+        return np.asarray(
+            rates * share_within(rates, work.lower, work.upper, work.matrix[0], work.upper[10])
+        )

@@ -11,10 +11,14 @@ integrates, *measured* comes from encoders, *true* is the simulator's own.
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Any, TypeAlias
 
 import numpy as np
 
 SCHEMA_VERSION = 1
+
+RecordFields: TypeAlias = Any
+"""A record or part of one inside compiled code, where its fields are attributes."""
 
 ARM_JOINTS = 7
 SERVOS = 4
@@ -211,7 +215,7 @@ REPORT = np.dtype(
     ]
 )
 """What the controller did. ``twist``: commanded tip twist (linear, angular). ``residual_*``: norms
-of what each level could not do, m/s and rad/s. ``limits_active``: bits, see robot.priority.limits."""
+of what each level could not do, m/s and rad/s. ``limits_active``: bits, see ``priority.limits``."""
 
 OUTCOME = np.dtype([("state", STATE), ("command", COMMAND), ("report", REPORT)])
 """What ``tick`` returns: the next state, the command, the report."""

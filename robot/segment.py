@@ -84,7 +84,7 @@ def jacobian(u: float, v: float, length: float, out: np.ndarray) -> None:
         out: (6, 2) filled; rows linear (m/rad) then angular (rad/rad), columns u, v.
     """
     phi = math.hypot(u, v)
-    versine, sinc, versine_slope, sinc_slope = _coefficients(phi)
+    versine, _, versine_slope, sinc_slope = _coefficients(phi)
     out[0, 0] = length * (versine + versine_slope * u * u)
     out[0, 1] = length * versine_slope * u * v
     out[1, 0] = -length * versine_slope * u * v

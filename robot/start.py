@@ -82,9 +82,7 @@ def _solve(
             break
         jacobian = _flange_jacobian(arm)
         damping = 1e-2 * min(1.0, float(residual @ residual))
-        step = jacobian.T @ np.linalg.solve(
-            jacobian @ jacobian.T + damping * np.eye(6), residual
-        )
+        step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + damping * np.eye(6), residual)
         largest = float(np.abs(step).max())
         q = np.clip(q + step * min(1.0, 0.5 / max(largest, 1e-12)), lower, upper)
     arm.update(q)

@@ -18,8 +18,9 @@ import math
 
 import numpy as np
 
+from robot.commands import rotation_error
 from robot.compiled import compiled
-from robot.records import Alignment, LeaderKind, Refusal, Safety
+from robot.records import Alignment, LeaderKind, RecordFields, Refusal, Safety
 from robot.rotations import (
     angle_between,
     apply,
@@ -29,7 +30,6 @@ from robot.rotations import (
     multiply_transposed,
     orthonormalize,
 )
-from robot.commands import rotation_error
 from robot.safety import Event, apply_event
 
 _ENABLED = int(Safety.ENABLED)
@@ -49,7 +49,7 @@ def _distance(a: np.ndarray, b: np.ndarray) -> float:
 
 
 @compiled
-def _valid(leader: np.ndarray) -> bool:
+def _valid(leader: RecordFields) -> bool:
     norm = 0.0
     for k in range(4):
         norm += leader.wxyz[k] * leader.wxyz[k]
@@ -60,7 +60,7 @@ def _valid(leader: np.ndarray) -> bool:
 
 
 @compiled
-def _settings_changed(s: np.ndarray, settings: np.ndarray) -> bool:
+def _settings_changed(s: RecordFields, settings: RecordFields) -> bool:
     if s.anchor_scale != settings.motion_scale:
         return True
     if s.anchor_lock_rotation != settings.lock_rotation:
@@ -75,7 +75,9 @@ def _settings_changed(s: np.ndarray, settings: np.ndarray) -> bool:
 
 
 @compiled
-def _anchor(s: np.ndarray, settings: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> None:
+def _anchor(
+    s: RecordFields, settings: RecordFields, position: np.ndarray, rotation: np.ndarray
+) -> None:
     """Take the leader's pose and the desired pose as the pair that belongs together."""
     for i in range(3):
         s.anchor_leader_position[i] = position[i]
@@ -91,7 +93,7 @@ def _anchor(s: np.ndarray, settings: np.ndarray, position: np.ndarray, rotation:
 
 @compiled
 def relative_target(
-    s: np.ndarray,
+    s: RecordFields,
     position: np.ndarray,
     rotation: np.ndarray,
     target_position: np.ndarray,
@@ -115,7 +117,7 @@ def relative_target(
 
 @compiled
 def approach(
-    s: np.ndarray,
+    s: RecordFields,
     target_position: np.ndarray,
     target_rotation: np.ndarray,
     dt: float,
@@ -154,7 +156,7 @@ def approach(
 
 
 @compiled
-def release(s: np.ndarray) -> None:
+def release(s: RecordFields) -> None:
     """Open the clutch: the desired pose is the commanded tip, nothing is left to chase."""
     s.engaged = 0
     s.leader_kind = 0
@@ -165,8 +167,13 @@ def release(s: np.ndarray) -> None:
 
 
 @compiled
-def _may_engage(outcome: np.ndarray, leader: np.ndarray, settings: np.ndarray, p: np.ndarray,
-                rotation: np.ndarray) -> bool:
+def _may_engage(
+    outcome: np.ndarray,
+    leader: RecordFields,
+    settings: RecordFields,
+    p: RecordFields,
+    rotation: np.ndarray,
+) -> bool:
     s = outcome[0].state
     if leader.absolute != 0:
         if leader.kind != _PATH and _distance(leader.position, s.tip_position) > p.target_distance:
@@ -180,6 +187,62 @@ def _may_engage(outcome: np.ndarray, leader: np.ndarray, settings: np.ndarray, p
             outcome[0].report.target_refused = _NOT_ALIGNED
             return False
     return True
+
+
+@compiled
+def _engage_or_check(
+    outcome: np.ndarray,
+    leader: RecordFields,
+    settings: RecordFields,
+    p: RecordFields,
+    rotation: np.ndarray,
+) -> bool:
+    """Engage a leader that is new, or check an engaged one for a jump; False: it must not lead."""
+    s = outcome[0].state
+    if s.engaged == 0 or s.leader_kind != leader.kind:
+        release(s)
+        stale = leader.age_s > leader.timeout_s
+        if stale or not _may_engage(outcome, leader, settings, p, rotation):
+            return False
+        s.engaged = 1
+        s.leader_kind = leader.kind
+        _anchor(s, settings, leader.position, rotation)
+        return True
+    if leader.absolute != 0 or leader.sequence == s.leader_sequence:
+        return True
+    jumped = _distance(leader.position, s.leader_position) > p.jump_position
+    if jumped or angle_between(rotation, s.leader_rotation) > p.jump_angle:
+        apply_event(outcome, _JUMP)
+        release(s)
+        return False
+    return True
+
+
+@compiled
+def _chase(s: RecordFields, tick_input: np.ndarray, rotation: np.ndarray, p: RecordFields) -> None:
+    """Find the target, lock what is locked, and move the desired pose toward it."""
+    leader = tick_input[0].leader
+    settings = tick_input[0].settings
+    target_position = np.empty(3)
+    target_rotation = np.empty((3, 3))
+    if leader.absolute != 0:
+        target_position[:] = leader.position
+        target_rotation[:] = rotation
+    else:
+        relative_target(s, leader.position, rotation, target_position, target_rotation)
+    if settings.lock_translation != 0:
+        target_position[:] = s.anchor_tip_position
+    if settings.lock_rotation != 0:
+        target_rotation[:] = s.anchor_tip_rotation
+    approach(
+        s,
+        target_position,
+        target_rotation,
+        tick_input[0].dt_s,
+        leader.smoothing_s,
+        p.speed_max,
+        p.angular_speed_max,
+    )
 
 
 @compiled
@@ -210,23 +273,8 @@ def follow(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) 
         return False
     rotation = np.empty((3, 3))
     matrix_from_quaternion(leader.wxyz, rotation)
-    if s.engaged == 0 or s.leader_kind != leader.kind:
-        release(s)
-        if leader.age_s > leader.timeout_s or not _may_engage(
-            outcome, leader, settings, p, rotation
-        ):
-            return False
-        s.engaged = 1
-        s.leader_kind = leader.kind
-        _anchor(s, settings, leader.position, rotation)
-    elif leader.absolute == 0 and leader.sequence != s.leader_sequence:
-        if (
-            _distance(leader.position, s.leader_position) > p.jump_position
-            or angle_between(rotation, s.leader_rotation) > p.jump_angle
-        ):
-            apply_event(outcome, _JUMP)
-            release(s)
-            return False
+    if not _engage_or_check(outcome, leader, settings, p, rotation):
+        return False
     if _settings_changed(s, settings):
         _anchor(s, settings, leader.position, rotation)
     s.leader_sequence = leader.sequence
@@ -234,24 +282,5 @@ def follow(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) 
         s.leader_position[i] = leader.position[i]
         for j in range(3):
             s.leader_rotation[i, j] = rotation[i, j]
-    target_position = np.empty(3)
-    target_rotation = np.empty((3, 3))
-    if leader.absolute != 0:
-        target_position[:] = leader.position
-        target_rotation[:] = rotation
-    else:
-        relative_target(s, leader.position, rotation, target_position, target_rotation)
-    if settings.lock_translation != 0:
-        target_position[:] = s.anchor_tip_position
-    if settings.lock_rotation != 0:
-        target_rotation[:] = s.anchor_tip_rotation
-    approach(
-        s,
-        target_position,
-        target_rotation,
-        tick_input[0].dt_s,
-        leader.smoothing_s,
-        p.speed_max,
-        p.angular_speed_max,
-    )
+    _chase(s, tick_input, rotation, p)
     return True

@@ -12,12 +12,9 @@ COLUMNS = 8
 
 
 @compiled
-def _evaluate(
-    time_s: float, breaks: np.ndarray, coefficients: np.ndarray, out: np.ndarray
-) -> None:
+def _evaluate(time_s: float, breaks: np.ndarray, coefficients: np.ndarray, out: np.ndarray) -> None:
     count = breaks.size - 1
-    piece = np.searchsorted(breaks, time_s, side="right") - 1
-    piece = min(max(piece, 0), count - 1)
+    piece = min(max(int(np.searchsorted(breaks, time_s, side="right")) - 1, 0), count - 1)
     s = min(max(time_s, breaks[0]), breaks[-1]) - breaks[piece]
     for k in range(7):
         c = coefficients[:, piece, k]

@@ -80,9 +80,7 @@ def parse_csv(text: str, name: str) -> Path:
             if header is None:
                 header = tuple(field.strip() for field in fields)
                 if header != HEADER:
-                    raise PathFileError(
-                        name, line, "", f"the columns must be {', '.join(HEADER)}"
-                    )
+                    raise PathFileError(name, line, "", f"the columns must be {', '.join(HEADER)}")
                 continue
             if len(fields) != len(HEADER):
                 raise PathFileError(

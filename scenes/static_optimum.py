@@ -1,4 +1,4 @@
-"""Offline: the best pose the instrument can take for a desired tip pose, whatever the controller does.
+"""Offline: the best pose the instrument can take for a desired tip pose, however controlled.
 
 Solved over the shaft's four freedoms at the trocar (turn, tilt, insertion) and the bend, with the
 bend limit, by a general bounded solver; the arm is assumed to reach. It shares no code path with

@@ -1,0 +1,1 @@
+"""Processes, records, the web, the scene view and the command line."""

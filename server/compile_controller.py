@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from scenes.experiments import experiment
 from server.configuration_file import load
 from server.headless_run import HeadlessRun, RunOptions
-from scenes.experiments import experiment
 
 
 def main() -> None:

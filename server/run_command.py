@@ -1,4 +1,4 @@
-"""``keyhole run``: one experiment or path file, headless, with figures as JSON and a trace as CSV."""
+"""``keyhole run``: an experiment or path file, headless; figures as JSON, a trace as CSV."""
 
 from __future__ import annotations
 

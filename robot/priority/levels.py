@@ -108,7 +108,9 @@ def plan(levels: tuple[Level, ...], characteristic_length: float) -> Plan:
             raise UnknownName("row set used only once", "+".join(level), tuple(ROW_SETS))
         mixed = bool(set(selected) & angular) and not set(selected) <= angular
         rows.extend(selected)
-        weights.extend(characteristic_length if mixed and row in angular else 1.0 for row in selected)
+        weights.extend(
+            characteristic_length if mixed and row in angular else 1.0 for row in selected
+        )
         starts.append(len(rows))
     return Plan(np.array(rows), np.array(weights), np.array(starts))
 
@@ -196,4 +198,6 @@ def assemble(
             matrix[r, k] = weights[r] * catalogue[rows[r], k]
         target[r] = weights[r] * targets[rows[r]]
     for level in range(starts.size - 1):
-        equalize(matrix[starts[level] : starts[level + 1]], target[starts[level] : starts[level + 1]])
+        equalize(
+            matrix[starts[level] : starts[level + 1]], target[starts[level] : starts[level + 1]]
+        )

@@ -39,44 +39,49 @@ def error_damping(distance: float, angle: float) -> float:
 
 
 class LexicographicProblem:
-    """Memory of one plan's QP: fill it, then solve.
+    """One plan's QP on memory that the caller fills.
 
     Attributes:
-        matrix: (1 + m, 10) constraint rows: the bend limit, then the plan's rows.
-        upper: (11 + m,) upper bounds: of the rates, of the bend row, of the plan's rows.
-        lower: (11 + m,) lower bounds.
-        preferred: (10,) rates wanted where nothing else decides, negated.
+        plan: the levels.
     """
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(
+        self, plan: Plan, matrix: np.ndarray, upper: np.ndarray, lower: np.ndarray
+    ) -> None:
+        """Use the caller's memory.
+
+        Args:
+            plan: the levels, m rows in all.
+            matrix: (>= 1 + m, 10) the bend row, then the plan's rows.
+            upper: (>= 11 + m,) upper bounds: of the rates, of the bend row, of the plan's rows.
+            lower: (>= 11 + m,) lower bounds.
+        """
         count = len(plan.rows)
         self.plan = plan
-        self.matrix = np.zeros((1 + count, 10))
-        self.upper = np.zeros(11 + count)
-        self.lower = np.full(11 + count, -1e30)
-        self.preferred = np.zeros(10)
-        self.level_matrix = self.matrix[1:]
-        self.level_upper = self.upper[11:]
-        self.level_lower = self.lower[11:]
+        self._matrix = matrix[: 1 + count]
+        self._upper, self._lower = upper[: 11 + count], lower[: 11 + count]
         self._hessian = np.eye(10)
+        self._linear = np.zeros(10)
         self._sense = np.zeros(11 + count, dtype=np.int32)
         self._break_points = np.array([11, *(11 + plan.starts[1:])], dtype=np.int32)
 
-    def solve(self, damping: float) -> tuple[np.ndarray, int]:
+    def solve(self, preferred: np.ndarray, damping: float) -> tuple[np.ndarray, int]:
         """Rates (10,) and daqp's exit flag (positive: solved).
 
         Args:
+            preferred: (10,) rates wanted where the levels leave freedom.
             damping: of every level, see :func:`error_damping`.
 
         Solved cold every time: a warm start gives rates that differ in the thirteenth digit, and a
         replay could not be compared bit for bit.
         """
+        np.negative(preferred, out=self._linear)
         rates, _, flag, _ = daqp.solve(
             self._hessian,
-            self.preferred,
-            self.matrix,
-            self.upper,
-            self.lower,
+            self._linear,
+            self._matrix,
+            self._upper,
+            self._lower,
             self._sense,
             self._break_points,
             rho_soft=_SOFT_WEIGHT + damping,

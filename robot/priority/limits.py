@@ -20,7 +20,7 @@ LAMBDA_LOW_BIT = 17
 LAMBDA_HIGH_BIT = 18
 
 BEND_MARGIN = 5e-5
-"""Kept from the bend limit, rad: a tick along the limit's circle leaves the tangent by up to this."""
+"""Kept from the bend limit, rad: a tick along the limit's circle leaves it by less than this."""
 LAMBDA_MARGIN = 1e-4
 """Kept from both ends of lambda: the true shaft and the commanded lambda differ by up to this after
 a fast tick."""
@@ -80,7 +80,7 @@ def rate_limits(
         bend_row[i] = 0.0
     bend_row[7] = x[7] / phi if phi > 1e-9 else 1.0
     bend_row[8] = x[8] / phi if phi > 1e-9 else 0.0
-    return gain * (p.bend_max - BEND_MARGIN - phi) / dt
+    return float(gain * (p.bend_max - BEND_MARGIN - phi) / dt)
 
 
 @compiled

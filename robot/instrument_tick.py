@@ -1,0 +1,336 @@
+"""The compiled stages of the instrument's tick, in the order in which they run."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from robot.commands import tip_twist
+from robot.compiled import compiled
+from robot.instrument import project_on_shaft, rcm_jacobian, shaft, tip, tip_jacobian
+from robot.priority.levels import assemble
+from robot.priority.limits import active_limits, rate_limits
+from robot.priority.meet_all import meet_all
+from robot.records import Case, Safety, Solver
+from robot.rotations import angle_between, quaternion_from_matrix
+from robot.safety import Event, apply_event, decide
+from robot.segment import polar
+from robot.teleoperation import follow
+from robot.tendons import servo_angles
+
+DONE, SOLVE_QP, SOLVE_CLOSED_FORM = -1, 0, 100
+"""What :func:`decide_and_prepare` left to do: nothing, or to solve; the case is added to these."""
+
+NOT_FINITE = -100
+"""Solver status when the rates hold NaN or infinity."""
+
+_ENABLED = int(Safety.ENABLED)
+_HQP, _AUGMENTED = int(Solver.HQP), int(Solver.AUGMENTED)
+_SOLVER_FAILED = int(Event.SOLVER_FAILED)
+_BALANCED = int(Case.BALANCED)
+_CORRECTIONS_PER_TICK = 0.5
+"""Largest share of the deviation at the trocar that one tick takes back."""
+
+
+@compiled
+def _begin(state: np.ndarray, outcome: np.ndarray) -> None:
+    """Copy the state into the outcome, clear command and report."""
+    source = state.view(np.float64)
+    target = outcome.view(np.float64)
+    for i in range(source.size):
+        target[i] = source[i]
+    for i in range(source.size, target.size):
+        target[i] = 0.0
+    outcome[0].state.tick += 1
+
+
+@compiled
+def _rcm_rows(
+    outcome: np.ndarray,
+    tick_input: np.ndarray,
+    parameters: np.ndarray,
+    base: np.ndarray,
+    end: np.ndarray,
+    catalogue: np.ndarray,
+    targets: np.ndarray,
+) -> None:
+    """The shaft's point at lambda follows the trocar, and what it is off is taken back."""
+    s = outcome[0].state
+    i_ = tick_input[0]
+    rcm_jacobian(s.arm_jacobian, base, end, s.x[9], catalogue[0:3])
+    gain = min(parameters[0].rcm_gain, _CORRECTIONS_PER_TICK / i_.dt_s)
+    for i in range(3):
+        point = base[i] + s.x[9] * (end[i] - base[i])
+        targets[i] = i_.trocar_velocity[i] + gain * (i_.trocar_position[i] - point)
+
+
+@compiled
+def _tip_rows(
+    outcome: np.ndarray, jacobian: np.ndarray, catalogue: np.ndarray, targets: np.ndarray
+) -> None:
+    """Linear rows in the base frame, angular rows in the tip frame."""
+    s = outcome[0].state
+    twist = outcome[0].report.twist
+    for i in range(3):
+        targets[3 + i] = twist[i]
+        targets[6 + i] = 0.0
+        for j in range(3):
+            targets[6 + i] += s.tip_rotation[j, i] * twist[3 + j]
+        for k in range(10):
+            catalogue[3 + i, k] = jacobian[i, k]
+            angular = 0.0
+            for j in range(3):
+                angular += s.tip_rotation[j, i] * jacobian[3 + j, k]
+            catalogue[6 + i, k] = angular
+
+
+@compiled
+def _preferences(
+    outcome: np.ndarray,
+    lambda_reference: float,
+    parameters: np.ndarray,
+    catalogue: np.ndarray,
+    targets: np.ndarray,
+    preferred: np.ndarray,
+) -> None:
+    """The lambda row, and what the freedom that is left is used for: posture, and lambda.
+
+    eq. (73) with the sign that draws lambda to its reference; the posture descends
+    sum((q - middle) / reach)^2, away from the joint limits.
+    """
+    s = outcome[0].state
+    p = parameters[0]
+    for k in range(10):
+        catalogue[9, k] = 0.0
+        preferred[k] = 0.0
+    catalogue[9, 9] = 1.0
+    targets[9] = p.lambda_gain * (lambda_reference - s.x[9])
+    if s.engaged == 0:
+        return
+    preferred[9] = targets[9]
+    for k in range(7):
+        reach = p.joint_upper[k] - p.joint_lower[k]
+        middle = 0.5 * (p.joint_upper[k] + p.joint_lower[k])
+        preferred[k] = -p.posture_gain * (s.x[k] - middle) * (math.pi / reach) ** 2
+
+
+@compiled
+def _tasks(
+    outcome: np.ndarray,
+    tick_input: np.ndarray,
+    parameters: np.ndarray,
+    previous_position: np.ndarray,
+    previous_rotation: np.ndarray,
+    catalogue: np.ndarray,
+    targets: np.ndarray,
+    preferred: np.ndarray,
+) -> None:
+    """Fill the catalogue of task rows, their wanted rates, and the preferred rates."""
+    s = outcome[0].state
+    settings = tick_input[0].settings
+    base, end, rotation = np.empty(3), np.empty(3), np.empty((3, 3))
+    shaft(s.arm_position, s.arm_rotation, parameters, base, end, rotation)
+    _rcm_rows(outcome, tick_input, parameters, base, end, catalogue, targets)
+    tip_twist(
+        s.desired_position,
+        s.desired_rotation,
+        previous_position,
+        previous_rotation,
+        s.tip_position,
+        s.tip_rotation,
+        tick_input[0].dt_s,
+        settings.feed_forward != 0 and s.engaged != 0,
+        settings.case == _BALANCED or settings.solver == _AUGMENTED,
+        parameters,
+        outcome[0].report.twist,
+    )
+    jacobian = np.empty((6, 10))
+    length = parameters[0].segment_length
+    tip_jacobian(s.arm_jacobian, rotation, s.tip_position, s.x[7], s.x[8], length, jacobian)
+    _tip_rows(outcome, jacobian, catalogue, targets)
+    _preferences(outcome, settings.lambda_reference, parameters, catalogue, targets, preferred)
+
+
+@compiled
+def integrate(
+    outcome: np.ndarray,
+    tick_input: np.ndarray,
+    status: int,
+    rates: np.ndarray,
+    catalogue: np.ndarray,
+    targets: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    bend_row: np.ndarray,
+    parameters: np.ndarray,
+) -> None:
+    """Move x by ``rates`` (10,) and note what levels and limits left over.
+
+    A solver that failed (``status`` <= 0) or rates that are not finite move nothing: FAULT.
+    """
+    s = outcome[0].state
+    report = outcome[0].report
+    dt = tick_input[0].dt_s
+    for k in range(10):
+        if not math.isfinite(rates[k]):
+            status = NOT_FINITE
+    report.solver_status = status
+    if status <= 0:
+        apply_event(outcome, _SOLVER_FAILED)
+        return
+    for k in range(10):
+        # The solver keeps the box to its tolerance only; this takes out no more than that.
+        rates[k] = min(max(rates[k], lower[k]), upper[k])
+    report.limits_active = active_limits(s.x, rates, lower, upper, bend_row, upper[10], parameters)
+    residual = np.zeros(3)
+    for row in range(9):
+        left = targets[row]
+        for k in range(10):
+            left -= catalogue[row, k] * rates[k]
+        residual[row // 3] += left * left
+    report.residual_rcm = math.sqrt(residual[0])
+    report.residual_linear = math.sqrt(residual[1])
+    report.residual_angular = math.sqrt(residual[2])
+    for k in range(10):
+        report.x_dot[k] = rates[k]
+        s.x[k] += dt * rates[k]
+    outcome[0].command.moving = 1
+
+
+@compiled
+def decide_and_prepare(
+    state: np.ndarray,
+    tick_input: np.ndarray,
+    parameters: np.ndarray,
+    outcome: np.ndarray,
+    plan_sizes: np.ndarray,
+    plan_rows: np.ndarray,
+    plan_weights: np.ndarray,
+    plan_starts: np.ndarray,
+    catalogue: np.ndarray,
+    targets: np.ndarray,
+    preferred: np.ndarray,
+    matrix: np.ndarray,
+    upper: np.ndarray,
+    lower: np.ndarray,
+    left_over: np.ndarray,
+) -> int:
+    """Safety, teleoperation, commands, levels and limits; and the motion, where all can be met.
+
+    Args:
+        state: (1,) the last outcome's state.
+        tick_input: (1,).
+        parameters: (1,).
+        outcome: (1,) filled.
+        plan_sizes: (cases, 2) rows and levels of each preset.
+        plan_rows: (cases, 10) catalogue rows of each preset.
+        plan_weights: (cases, 10) their weights.
+        plan_starts: (cases, 11) first row of each level.
+        catalogue: (10, 10) filled with the task rows.
+        targets: (10,) filled with their wanted rates.
+        preferred: (10,) filled with the preferred rates.
+        matrix: (11, 10) filled: the bend row, then the plan's rows.
+        upper: (21,) filled: of the rates, the bend row, the plan's rows.
+        lower: (21,) filled likewise.
+        left_over: (2,) filled: position error (m) and orientation error (rad) of the last tick.
+
+    Returns:
+        ``DONE``, or the case plus ``SOLVE_QP`` or ``SOLVE_CLOSED_FORM``.
+    """
+    _begin(state, outcome)
+    s = outcome[0].state
+    i_ = tick_input[0]
+    previous_position = s.desired_position.copy()
+    previous_rotation = s.desired_rotation.copy()
+    just_enabled = decide(outcome, tick_input, parameters)
+    engaged = follow(outcome, tick_input, parameters)
+    if just_enabled or s.safety != _ENABLED:
+        return DONE
+    still = i_.trocar_velocity[0] == 0.0 and i_.trocar_velocity[1] == 0.0
+    if not engaged and still and i_.trocar_velocity[2] == 0.0:
+        return DONE
+    _tasks(
+        outcome,
+        tick_input,
+        parameters,
+        previous_position,
+        previous_rotation,
+        catalogue,
+        targets,
+        preferred,
+    )
+    square = 0.0
+    for i in range(3):
+        square += (previous_position[i] - s.tip_position[i]) ** 2
+    left_over[0] = math.sqrt(square)
+    left_over[1] = angle_between(previous_rotation, s.tip_rotation)
+    case = i_.settings.case
+    rows, levels = plan_sizes[case, 0], plan_sizes[case, 1]
+    upper[10] = rate_limits(s.x, i_.dt_s, parameters, lower, upper, matrix[0])
+    assemble(
+        catalogue,
+        targets,
+        plan_rows[case, :rows],
+        plan_weights[case, :rows],
+        plan_starts[case, : levels + 1],
+        matrix[1:],
+        upper[11:],
+    )
+    for r in range(11, 11 + rows):
+        lower[r] = upper[r]
+    if i_.settings.solver != _HQP:
+        return SOLVE_CLOSED_FORM + int(case)
+    rates = np.empty(10)
+    levels_matrix, levels_target = matrix[1 : 1 + rows], upper[11 : 11 + rows]
+    if not meet_all(levels_matrix, levels_target, preferred, lower, upper, matrix[0], rates):
+        return SOLVE_QP + int(case)
+    integrate(
+        outcome, tick_input, 1, rates, catalogue, targets, lower, upper, matrix[0], parameters
+    )
+    return DONE
+
+
+@compiled
+def conclude(
+    outcome: np.ndarray,
+    tick_input: np.ndarray,
+    arm_position: np.ndarray,
+    arm_rotation: np.ndarray,
+    arm_jacobian: np.ndarray,
+    parameters: np.ndarray,
+) -> None:
+    """Forward kinematics of the new x into the state, and the command and report that follow."""
+    s = outcome[0].state
+    p = parameters[0]
+    for i in range(3):
+        s.arm_position[i] = arm_position[i]
+        for j in range(3):
+            s.arm_rotation[i, j] = arm_rotation[i, j]
+    for i in range(6):
+        for j in range(7):
+            s.arm_jacobian[i, j] = arm_jacobian[i, j]
+    base, end, rotation = np.empty(3), np.empty(3), np.empty((3, 3))
+    shaft(s.arm_position, s.arm_rotation, parameters, base, end, rotation)
+    tip(end, rotation, s.x[7], s.x[8], p.segment_length, s.tip_position, s.tip_rotation)
+    command, report = outcome[0].command, outcome[0].report
+    if s.engaged == 0 and command.moving == 0:
+        s.x[9] = project_on_shaft(tick_input[0].trocar_position, base, end)[0]
+        s.desired_position[:] = s.tip_position
+        s.desired_rotation[:] = s.tip_rotation
+    for i in range(7):
+        command.q[i] = s.x[i]
+    servo_angles(s.x[7], s.x[8], p.pitch_radius, p.pulley_radius, command.servo)
+    report.x[:] = s.x
+    report.theta, report.delta = polar(s.x[7], s.x[8])
+    report.desired_position[:] = s.desired_position
+    report.commanded_position[:] = s.tip_position
+    quaternion_from_matrix(s.desired_rotation, report.desired_wxyz)
+    quaternion_from_matrix(s.tip_rotation, report.commanded_wxyz)
+
+
+@compiled
+def copy_joints(outcome: np.ndarray, q: np.ndarray) -> None:
+    """Copy the commanded joint angles to ``q`` (7,): cheaper than a view into the record."""
+    for i in range(7):
+        q[i] = outcome[0].state.x[i]
