@@ -52,7 +52,7 @@ class ChildProcess:
     ) -> None:
         self.title = title
         self.restarts = 0
-        self._command = [sys.executable, "-P", "-m", module, *arguments]
+        self._command = module_command(module, arguments)
         self._descriptors = tuple(descriptors)
         self._first_pause_s = self._pause_s = pause_s
         self._process: subprocess.Popen[bytes] | None = None
@@ -72,7 +72,7 @@ class ChildProcess:
             self._command,
             pass_fds=self._descriptors,
             stdin=subprocess.DEVNULL,
-            env=_environment(),
+            env=module_environment(),
             start_new_session=True,
         )
 
@@ -120,12 +120,17 @@ class ChildProcess:
         return True
 
 
-def _environment() -> dict[str, str]:
-    """The environment, with this package findable where it runs without being installed.
+def module_command(module: str, arguments: Sequence[str]) -> list[str]:
+    """Command that runs a module of ours with this interpreter.
 
     ``-P`` keeps the folder in which the console was started off the path: a folder called
     ``robot`` in it must not take the place of ours.
     """
+    return [sys.executable, "-P", "-m", module, *arguments]
+
+
+def module_environment() -> dict[str, str]:
+    """The environment for it: this one, and where to find us if we are not installed."""
     environment = dict(os.environ)
     root = Path(__file__).resolve().parent.parent
     if (root / "pyproject.toml").exists():

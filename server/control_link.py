@@ -170,7 +170,7 @@ class ControlLink:
 
     def _poll_web(self, now_ns: int) -> None:
         if self._supervision.update():
-            self._web_is_up = bool(self._supervision.record["web_up"][0])
+            self._web_is_up = bool(self._supervision.record["web_pid"][0])
         self._alive.update()
         if self._hold.update():
             self._hold_is_down = bool(self._hold.record["down"][0])

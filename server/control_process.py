@@ -16,7 +16,7 @@ import time
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,9 @@ from server.control_link import ControlLink
 from server.lifeline import Lifeline
 from server.link_records import STATUS, Phase
 from server.run_directory import RunDirectory
+
+if TYPE_CHECKING:
+    from server.control_runner import ControlRunner
 
 _LOCK_PATIENCE_S = 10.0
 
@@ -93,12 +96,12 @@ def _run(directory: RunDirectory, configuration: Configuration, lifeline: Lifeli
         signal.signal(signal.SIGTERM, lambda *_: runner.stop())
         words = realtime.enter(configuration.control.realtime)
         status.say(Phase.RUNNING, "running", realtime=words, plant=plant.spec.name)
-        return _drive(runner, status)
+        return drive(runner, status)
     finally:
         plant.close()
 
 
-def _drive(runner: Any, status: Status) -> int:
+def drive(runner: ControlRunner, status: Status) -> int:
     """Run the loop to its end, whichever that is; returns the exit status."""
     try:
         runner.run()

@@ -78,14 +78,14 @@ SUPERVISION = np.dtype(
     [
         ("control", "i8"),
         ("control_pid", "i8"),
-        ("web_up", "i8"),
+        ("web_pid", "i8"),
         ("control_restarts", "i8"),
         ("web_restarts", "i8"),
         ("stamp_ns", "i8"),
         ("message", "S256"),
     ]
 )
-"""Supervisor to all: which processes are up, and why one had to be restarted."""
+"""Supervisor to all: which processes are up (their ids, else 0), and why one was restarted."""
 
 RECORD_SLOT_FILE = "record.slot"
 RECORD_RING_FILE = "record.ring"

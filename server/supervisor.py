@@ -201,7 +201,7 @@ class Supervisor:
         self._control_state = control
         record = np.zeros(1, dtype=SUPERVISION)
         record["control"], record["control_pid"] = int(control), self._control.pid
-        record["web_up"] = int(self._web.pid != 0)
+        record["web_pid"] = self._web.pid
         record["control_restarts"] = self._control.restarts
         record["web_restarts"] = self._web.restarts
         record["message"] = self._message.encode()

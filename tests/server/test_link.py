@@ -223,10 +223,10 @@ def test_a_silent_web_server_is_a_lost_operator_once(web: WebLink, control: Cont
 def test_a_dead_web_process_is_a_lost_operator_at_once(
     web: WebLink, control: ControlLink, directory: Path
 ) -> None:
-    supervise(directory, web_up=1)
+    supervise(directory, web_pid=1)
     web.alive()
     assert poll(control) == Request.NONE
-    supervise(directory, web_up=0)
+    supervise(directory, web_pid=0)
     web.request(Request.DISABLE)
     assert poll(control) == Request.DISABLE
     assert poll(control) == Request.OPERATOR_LOST
