@@ -75,9 +75,9 @@ async def dexterity(services: ServicesHere) -> dict[str, Any]:
     case = Case(int(record["input"]["settings"]["case"][0]))
 
     def measure() -> dict[str, Any]:
-        from robot.dexterity import measures
+        from robot.dexterity import Dexterity
 
-        found = measures(services.configuration, x, case)
+        found = Dexterity(services.configuration).at(x, case)
         return {name: _plain(value) for name, value in found.items()}
 
     return await asyncio.to_thread(measure)

@@ -229,7 +229,7 @@ class StateMessages:
                 "min": self._limits.lambda_min,
                 "max": self._limits.lambda_max,
             },
-            "bend_deg": _round(math.degrees(report["theta"]), 5),
+            "bend_deg": _round(90.0 - math.degrees(report["theta"]), 5),
             "bend_limit_deg": self._limits.bend_deg,
             "direction_deg": _round(math.degrees(report["delta"]), 5),
             "joints_deg": _degrees(x[:7]),
