@@ -122,7 +122,8 @@ class SceneTrails:
 def _pieces(points: NDArray[np.float64], shown: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Line pieces (n, 2, 3) between neighbours; one of no length if there are none."""
     steps = np.linalg.norm(points[1:] - points[:-1], axis=1)
-    pieces = np.stack([points[:-1], points[1:]], axis=1)[shown & (steps < LARGEST_STEP)]
+    pairs = np.stack([points[:-1], points[1:]], axis=1)
+    pieces: NDArray[np.float32] = pairs[shown & (steps < LARGEST_STEP)].astype(np.float32)
     if not len(pieces):
-        pieces = np.repeat(points[None, -1:], 2, axis=1)
-    return pieces.astype(np.float32)
+        pieces = np.repeat(points[None, -1:], 2, axis=1).astype(np.float32)
+    return pieces

@@ -98,6 +98,7 @@ class SceneView:
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._drawn = -np.inf
+        self._failed = False
 
     def start(self) -> None:
         """Draw from a thread of its own."""
@@ -118,6 +119,11 @@ class SceneView:
                 self.step(time.monotonic())
             except KeyholeError as error:
                 log.debug("no picture: %s", error)
+            except Exception:
+                # One bad picture must not end the rest; a held gizmo goes stale by itself.
+                if not self._failed:
+                    log.exception("the scene could not be drawn; told once")
+                self._failed = True
             deadline = max(deadline + PERIOD, time.monotonic())
             self._stop.wait(deadline - time.monotonic())
 

@@ -1,0 +1,123 @@
+"""What the tests of the scene share: a link without a control process, and ways to look."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import viser
+import viser.transforms as tf
+from numpy.typing import NDArray
+
+from robot.configuration import Configuration
+from robot.forward import ForwardKinematics
+from robot.instrument_robot import InstrumentRobot
+from robot.records import RECORD, LeaderKind, Safety
+from robot.urdf import urdf_text
+from server.mapped import MappedReadError
+
+
+class Sample(NamedTuple):
+    """A leader sample, and when it came (monotonic s)."""
+
+    time: float
+    sequence: int
+    clutch: bool
+    position: NDArray[np.float64]
+
+
+class Recorder:
+    """A link that hands out one record and keeps the samples."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        robot = InstrumentRobot(configuration)
+        self.kinematics = ForwardKinematics(urdf_text(configuration), robot.parameters)
+        self.start: NDArray[np.float64] = robot.initial_state()["x"][0].copy()
+        self.record: NDArray[Any] = np.zeros(1, RECORD)
+        self.record["header"]["tick"] = 1
+        self.record["input"]["trocar_position"] = configuration.trocar.position_m
+        self.record["outcome"]["state"]["safety"] = Safety.ENABLED
+        self.samples: list[Sample] = []
+        self.failures = 0
+        self.reads = 0
+        self.move(self.start)
+
+    def move(self, x: NDArray[np.float64]) -> None:
+        """Put robot, commanded and desired tip where the configuration ``x`` has them."""
+        record = self.record.copy()
+        truth, report = record["truth"], record["outcome"]["report"]
+        self.kinematics.fill(truth, x[:7].copy(), float(x[7]), float(x[8]))
+        for word in ("desired", "commanded"):
+            report[f"{word}_position"] = truth["position"]
+            report[f"{word}_wxyz"] = truth["wxyz"]
+        self.record = record
+
+    def snapshot(self) -> NDArray[Any]:
+        self.reads += 1
+        if self.failures:
+            self.failures -= 1
+            raise MappedReadError(Path("record"), "torn")
+        return self.record
+
+    def leader(
+        self,
+        kind: LeaderKind,
+        *,
+        sequence: int,
+        clutch: bool,
+        position: NDArray[np.float64],
+        wxyz: NDArray[np.float64],
+        absolute: bool,
+        smoothing_s: float,
+        timeout_s: float,
+    ) -> None:
+        assert kind == LeaderKind.GIZMO
+        assert not absolute
+        assert smoothing_s == pytest.approx(0.05)
+        assert timeout_s == pytest.approx(0.12)
+        assert np.linalg.norm(wxyz) == pytest.approx(1.0)
+        self.samples.append(Sample(time.monotonic(), sequence, clutch, position))
+
+
+def until(condition: Callable[[], bool], seconds: float = 10.0) -> None:
+    """Wait for ``condition``."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.005)
+
+
+def messages(server: viser.ViserServer) -> int:
+    """Messages sent to all browsers since the start; viser counts them, but not in public."""
+    return server._websock_server._broadcast_buffer.message_counter
+
+
+def pose(server: viser.ViserServer, name: str) -> tf.SE3:
+    """World pose of a scene node, through all its parents."""
+    parts = name.strip("/").split("/")
+    world = tf.SE3.identity()
+    for count in range(1, len(parts) + 1):
+        node = server.scene.get_handle_by_name("/" + "/".join(parts[:count]))
+        assert node is not None, parts[:count]
+        world = world @ tf.SE3.from_rotation_and_translation(tf.SO3(node.wxyz), node.position)
+    return world
+
+
+def handle(server: viser.ViserServer, name: str) -> Any:
+    """The node of that name, which must exist."""
+    node = server.scene.get_handle_by_name(name)
+    assert node is not None, name
+    return node
+
+
+def somewhere(start: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    """A configuration near the start with any bend up to 1.5 rad."""
+    x = start.copy()
+    x[:7] += rng.uniform(-0.3, 0.3, 7)
+    direction = rng.uniform(0.0, 2.0 * np.pi)
+    x[7:9] = rng.uniform(0.0, 1.5) * np.array([np.cos(direction), np.sin(direction)])
+    return x
