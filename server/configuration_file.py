@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from robot.configuration import Configuration, parse
 from robot.errors import ConfigurationError, KeyholeError
@@ -29,8 +31,10 @@ class ConfigurationUnreadable(ConfigurationError):
 def load(path: Path | str | None = None) -> Configuration:
     """Read and validate a configuration file; without one, the configuration that comes along.
 
+    A file whose name ends in ``.json`` is read as JSON, every other as TOML.
+
     Raises:
-        ConfigurationError: the file cannot be read, is no TOML, or holds a wrong value; the
+        ConfigurationError: the file cannot be read or parsed, or holds a wrong value; the
             message is one line with the file, the place and the reason.
     """
     if path is None:
@@ -43,9 +47,16 @@ def load(path: Path | str | None = None) -> Configuration:
         except OSError as error:
             raise ConfigurationUnreadable(name, error.strerror or "cannot be read") from None
     try:
-        table = tomllib.loads(content.decode())
+        table = _parse_json(content) if name.endswith(".json") else tomllib.loads(content.decode())
     except UnicodeDecodeError as error:
         raise ConfigurationUnreadable(name, f"is not UTF-8 at byte {error.start}") from None
     except tomllib.TOMLDecodeError as error:
         raise ConfigurationUnreadable(name, f"is not TOML: {error}") from None
+    except json.JSONDecodeError as error:
+        raise ConfigurationUnreadable(name, f"is not JSON: {error}") from None
     return parse(table, name)
+
+
+def _parse_json(content: bytes) -> dict[str, Any]:
+    table = json.loads(content.decode())
+    return table if isinstance(table, dict) else {}

@@ -13,13 +13,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from benchmarks.console import START_S
 from robot.records import LeaderKind, Request, Safety
 from server.child_process import module_command, module_environment
 from server.configuration_file import load
 from server.link import WebLink
 from server.link_records import create_mapped_files
 from server.run_directory import RunDirectory
-from tests.server.console_process import START_S, eventually
+from tests.server.console_process import eventually
 
 PRESSES = 20
 
