@@ -13,13 +13,15 @@ import contextlib
 import json
 import math
 import os
+import signal
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from types import FrameType
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -120,6 +122,10 @@ def _say(message: str) -> None:
     print(f"keyhole: {message}", file=sys.stderr, flush=True)
 
 
+def _end(number: int, _: FrameType | None) -> NoReturn:
+    sys.exit(128 + number)
+
+
 def measure(configuration: Configuration, seconds: float) -> dict[str, Any]:
     """Measure.
 
@@ -132,6 +138,8 @@ def measure(configuration: Configuration, seconds: float) -> dict[str, Any]:
         p99, p99_9, max`` in µs, ``lost_ticks`` and ``ticks``; ``p99_above_reference_us`` and
         ``lost_ticks_above_reference``. Under ``load`` what was attached.
     """
+    # Ended by a signal, the console and the helpers must end too.
+    signal.signal(signal.SIGTERM, _end)
     control = configuration.control
     rounds = max(ROUNDS, math.ceil(seconds / (0.8 * control.record_ring_seconds)))
     told: dict[str, Any] = {}
