@@ -36,8 +36,17 @@ PRESETS: dict[Case, tuple[Level, ...]] = {
     Case.BALANCED: (("rcm",), ("linear", "angular")),
     Case.LINEAR_FIRST: (("rcm",), ("linear",), ("angular",)),
     Case.ANGULAR_FIRST: (("rcm",), ("angular",), ("linear",)),
-    Case.POINTING: (("rcm",), ("linear",), ("pointing",), ("lambda",)),
+    Case.POINTING: (("rcm",), ("linear",), ("pointing",)),
 }
+"""Below the RCM: everything together; position, then orientation; the reverse; position, then the
+direction of the tip's axis, with roll released.
+
+None of these leaves lambda free. Trocar, tip and the tip's axis lie in the bending plane, and
+inside that plane shaft angle, insertion and bend are as many unknowns as position and direction are
+equations. Releasing roll lets shaft roll and bending direction turn against each other, which moves
+nothing along the shaft. Lambda can be steered by a plan that releases a direction of position or
+pointing, with ``lambda`` as a level of its own.
+"""
 
 CASE_NAMES: dict[str, Case] = {
     "0": Case.BALANCED,
