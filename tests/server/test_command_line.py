@@ -1,0 +1,121 @@
+"""The command line: the default command, one-line refusals, and broken pipes."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+from typing import Any
+
+import pytest
+
+from robot.errors import KeyholeError
+from server import command_line, console_command
+from server.child_process import module_command, module_environment
+from server.command_line import COMMANDS, main
+from server.version import version
+
+
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> list[argparse.Namespace]:
+    """The arguments of each console that would have been started."""
+    calls: list[argparse.Namespace] = []
+
+    def execute(arguments: argparse.Namespace) -> int:
+        calls.append(arguments)
+        return 0
+
+    monkeypatch.setattr(console_command, "execute", execute)
+    return calls
+
+
+@pytest.mark.parametrize(
+    ("arguments", "port", "no_browser"),
+    [
+        ([], None, False),
+        (["console"], None, False),
+        (["--port", "8123"], 8123, False),
+        (["console", "--port", "0", "--no-browser"], 0, True),
+        (["--no-browser"], None, True),
+    ],
+)
+def test_the_console_is_the_default(
+    started: list[argparse.Namespace], arguments: list[str], port: int | None, no_browser: bool
+) -> None:
+    assert main(arguments) == 0
+    assert (started[0].port, started[0].no_browser) == (port, no_browser)
+    assert started[0].robot == "instrument"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--port", "70000"], "is not a port; give a number from 0 to 65535"),
+        (["--port", "http"], "is not a port"),
+        (["--speed", "3"], "unrecognized arguments"),
+        (["fly"], "invalid choice: 'fly'"),
+        (["bench"], "required"),
+    ],
+)
+def test_wrong_arguments_are_refused_in_one_line(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.startswith("keyhole")
+    assert words in told.err
+    assert told.err.count("\n") == 1
+
+
+def test_a_refusal_is_one_line_and_status_2(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(_: Any) -> int:
+        raise KeyholeError("first\nsecond")
+
+    monkeypatch.setattr(console_command, "execute", refuse)
+    assert main([]) == 2
+    assert capsys.readouterr().err == "keyhole: first second\n"
+
+
+def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    told = capsys.readouterr().out
+    for name in COMMANDS:
+        assert f"  {name} " in told
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"keyhole {version()}\n"
+
+
+def test_an_interrupt_has_its_own_status(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(_: Any) -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(console_command, "execute", interrupt)
+    assert main([]) == 130
+
+
+def test_only_the_asked_command_is_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    imported: list[str] = []
+    monkeypatch.setitem(command_line.COMMANDS, "run", "no.such.module")
+    monkeypatch.setattr(console_command, "execute", lambda _: imported.append("console") or 0)
+    assert main(["--no-browser"]) == 0
+    assert imported == ["console"]
+
+
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    process = subprocess.Popen(
+        module_command("server.command_line", ["states"]),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=module_environment(),
+    )
+    assert process.stdout is not None
+    process.stdout.close()
+    assert process.stderr is not None
+    assert process.stderr.read() == b""
+    process.stderr.close()
+    process.wait()
