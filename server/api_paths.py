@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 router = APIRouter(prefix=ROBOT, tags=["paths"])
 
 
-def _experiments(configuration: Configuration) -> list[ExperimentEntry]:
+def list_experiments(configuration: Configuration) -> list[ExperimentEntry]:
+    """Every experiment, with its length."""
     from scenes import experiments
 
     found = [experiments.experiment(name, configuration) for name in experiments.names()]
@@ -42,7 +43,7 @@ def _path(body: PathStart, configuration: Configuration) -> Path:
 @router.get("/experiments", summary="The experiments that can be played")
 async def experiments(services: ServicesHere) -> list[ExperimentEntry]:
     """Each is a path of the tip relative to where it starts."""
-    return await asyncio.to_thread(_experiments, services.configuration)
+    return await asyncio.to_thread(list_experiments, services.configuration)
 
 
 @router.post("/path", summary="Play a path from where the tip is", responses=STATE)

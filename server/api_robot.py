@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-import numpy as np
 from fastapi import APIRouter
 from starlette.responses import Response
 
@@ -73,18 +72,4 @@ async def dexterity(services: ServicesHere) -> dict[str, Any]:
     record = services.source.fresh_record()
     x = record["outcome"]["report"]["x"][0].copy()
     case = Case(int(record["input"]["settings"]["case"][0]))
-
-    def measure() -> dict[str, Any]:
-        from robot.dexterity import Dexterity
-
-        found = Dexterity(services.configuration).at(x, case)
-        return {name: _plain(value) for name, value in found.items()}
-
-    return await asyncio.to_thread(measure)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _plain(part) for name, part in value.items()}
-    plain = np.asarray(value).tolist()
-    return plain if not isinstance(plain, float) or np.isfinite(plain) else None
+    return await asyncio.to_thread(services.dexterity.at, x, case)

@@ -6,6 +6,7 @@ import logging
 import os
 import secrets
 import threading
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,7 +34,7 @@ class SceneServer:
 
     def __init__(self, configuration: Configuration, link: WebLink) -> None:
         self._configuration, self._link = configuration, link
-        self._thread = threading.Thread(target=self._bring_up, name="scene-start", daemon=True)
+        self._thread: threading.Thread | None = None
         self._state = "loading"
         self._address: ViserAddress | None = None
         self._viser: ViserServer | None = None
@@ -47,17 +48,25 @@ class SceneServer:
         """Where viser listens; None before the whole scene stands."""
         return self._address
 
-    def start(self) -> None:
-        """Begin to load; returns at once."""
+    def start(self, afterwards: Callable[[], None]) -> None:
+        """Begin to load; returns at once.
+
+        Args:
+            afterwards: called from the loading thread when the scene is up, or has failed.
+        """
+        self._thread = threading.Thread(
+            target=self._bring_up, args=(afterwards,), name="scene-start", daemon=True
+        )
         self._thread.start()
 
-    def _bring_up(self) -> None:
+    def _bring_up(self, afterwards: Callable[[], None]) -> None:
         try:
             self._load()
         except Exception as error:
             # The console must stay usable without its picture, and say why there is none.
             _log.exception("the scene could not be loaded")
             self._state = f"failed: {type(error).__name__}: {error}"
+        afterwards()
 
     def _load(self) -> None:
         # It would put viser on a port that others can guess.
@@ -79,7 +88,8 @@ class SceneServer:
 
     def stop(self) -> None:
         """End the view and viser."""
-        self._thread.join(timeout=5.0)
+        if self._thread is not None:
+            self._thread.join(timeout=5.0)
         self._address = None
         if self._view is not None:
             self._view.stop()

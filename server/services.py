@@ -15,6 +15,7 @@ from server.access import Caller
 from server.access_guard import caller_of
 from server.api_leaders import PoseLeader, TargetLeader
 from server.control_requests import ControlRequests
+from server.dexterity_source import DexteritySource
 from server.lease import Lease
 from server.link import WebLink
 from server.operator_watch import OperatorWatch
@@ -34,6 +35,7 @@ class Services:
         target: the API's standing target.
         pose: the API's clutched leader.
         watch: over the operator.
+        dexterity: where the tip is.
         scene: ``loading``, ``ready``, or why there is no scene.
     """
 
@@ -45,6 +47,7 @@ class Services:
     target: TargetLeader
     pose: PoseLeader
     watch: OperatorWatch
+    dexterity: DexteritySource
     scene: Callable[[], str]
 
     def state(self, caller: Caller) -> Response:
@@ -69,6 +72,7 @@ def make_services(
         target,
         pose,
         OperatorWatch(link, source, lease, target, pose),
+        DexteritySource(configuration),
         scene,
     )
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from fastapi import APIRouter, Request, WebSocket
 from starlette.responses import Response
-from starlette.websockets import WebSocketState
+from starlette.websockets import WebSocketDisconnect, WebSocketState
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
@@ -33,6 +33,7 @@ _PROTOCOL_PREFIX = "viser-v"
 _TRY_AGAIN = 1013
 _GOING_AWAY = 1001
 _LEASE_WATCH_S = 0.1
+_GONE = (ConnectionClosed, WebSocketDisconnect, RuntimeError)
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ async def _pass_through(
         for task in tasks:
             task.cancel()
         for task in tasks:
-            with contextlib.suppress(asyncio.CancelledError, ConnectionClosed, RuntimeError):
+            with contextlib.suppress(asyncio.CancelledError, *_GONE):
                 await task
 
 

@@ -12,7 +12,8 @@ import logging
 import signal
 import socket
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import uvicorn
@@ -20,10 +21,12 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from robot.errors import KeyholeError
 from server.access import Access
+from server.api_paths import list_experiments
 from server.lifeline import end_with_supervisor
 from server.link import WebLink
 from server.run_directory import RunDirectory
 from server.scene_server import SceneServer
+from server.services import Services
 from server.web_app import create_app
 
 UNSENT_BYTES = 16_384
@@ -52,14 +55,26 @@ class ShortQueueProtocol(WebSocketsSansIOProtocol):
 class WebServer(uvicorn.Server):
     """uvicorn that starts the scene only when it answers."""
 
-    def __init__(self, config: uvicorn.Config, scene: SceneServer) -> None:
+    def __init__(
+        self, config: uvicorn.Config, scene: SceneServer, afterwards: Callable[[], None]
+    ) -> None:
         super().__init__(config)
-        self._scene = scene
+        self._scene, self._afterwards = scene, afterwards
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Listen, then load the scene."""
         await super().startup(sockets)
-        self._scene.start()
+        self._scene.start(self._afterwards)
+
+
+def load_the_rest(services: Services) -> None:
+    """Load what else the first request for it would wait for, and everyone else with it."""
+    try:
+        list_experiments(services.configuration)
+        services.dexterity.load()
+    except Exception:
+        # Whoever asks for it will be told what is wrong with it.
+        logging.getLogger("keyhole.web").exception("loading in advance failed")
 
 
 def serve(directory: RunDirectory, listener: socket.socket) -> None:
@@ -87,7 +102,8 @@ def serve(directory: RunDirectory, listener: socket.socket) -> None:
         timeout_graceful_shutdown=_PATIENCE_S,
     )
     try:
-        WebServer(config, scene).run(sockets=[listener])
+        afterwards = partial(load_the_rest, app.state.services)
+        WebServer(config, scene, afterwards).run(sockets=[listener])
     finally:
         scene.stop()
         link.close()
