@@ -6,6 +6,7 @@ explicit RESET and leads to DISABLED, never to motion.
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from robot.compiled import compiled
 from robot.errors import KeyholeError
-from robot.records import Request, Safety
+from robot.records import RecordFields, Request, Safety
 from robot.tendons import bend_from_servos
 
 
@@ -186,6 +187,18 @@ def tracking_distance(x: np.ndarray, measured_q: np.ndarray) -> float:
 
 
 @compiled
+def _measured(tick_input: RecordFields) -> bool:
+    """Whether the measurement is valid, recent, and made of numbers."""
+    total = 0.0
+    for k in range(7):
+        total += abs(tick_input.measured_q[k])
+    for k in range(4):
+        total += abs(tick_input.measured_servo[k])
+    recent = tick_input.measured_age_s <= MEASUREMENT_TIMEOUT_S
+    return bool(tick_input.measured_valid != 0 and recent and math.isfinite(total))
+
+
+@compiled
 def decide(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) -> bool:
     """Apply this tick's request and what the measurement tells to the state in ``outcome``.
 
@@ -204,7 +217,7 @@ def decide(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) 
     before = s.safety
     if i.request != 0:
         apply_event(outcome, i.request)
-    if i.measured_valid == 0 or not i.measured_age_s <= MEASUREMENT_TIMEOUT_S:
+    if not _measured(i):
         apply_event(outcome, _LOST)
         return False
     if before == _DISABLED and s.safety == _ENABLED:
