@@ -53,9 +53,9 @@ def named_view(
         # Below the wall, as an endoscope through a second port would see it.
         look_at = tip + 0.02 * inward
         return View(trocar + 0.012 * inward + 0.06 * sideways - 0.006 * up, look_at)
-    # The middle leans toward the tip: that is where the work is.
-    look_at = 0.5 * trocar + 0.5 * tip
-    return View(look_at + 0.31 * sideways + 0.30 * forward + 0.14 * up, look_at)
+
+    look_at = 0.55 * trocar + 0.45 * tip
+    return View(look_at + 0.37 * sideways + 0.36 * forward + 0.17 * up, look_at)
 
 
 class SceneCamera:

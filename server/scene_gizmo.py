@@ -1,12 +1,13 @@
 """The gizmo at the tip: one leader among others, and the only thing here that writes.
 
 The browser sends a pose at most twenty times a second and only when it changes. While it is held,
-the last pose is repeated from the view's thread, so that holding still is not a stale leader, while
-a view that hangs is one.
+viser's event loop repeats the last pose, so that holding still is not a stale leader, while a
+server that no longer listens to the browser is one.
 """
 
 from __future__ import annotations
 
+import asyncio
 import threading
 from typing import Protocol
 
@@ -21,7 +22,7 @@ SIZE = 0.06
 """Length of an arrow, m."""
 SMOOTHING = 0.05
 """Samples come 50 ms apart; the control interpolates over this (s)."""
-REPEAT_PERIOD = 0.02
+REPEAT_PERIOD = 0.025
 FOLLOW_PERIOD = 0.1
 PUT_BACK_PERIOD = 1.0
 READY_OPACITY, RESTING_OPACITY = 0.8, 0.3
@@ -64,10 +65,9 @@ class SceneGizmo:
         self._sequence = 0
         self._position = np.zeros(3)
         self._wxyz = np.array([1.0, 0.0, 0.0, 0.0])
-        self._sent = 0.0
+        self._timer: asyncio.TimerHandle | None = None
         self._followed = 0.0
         self._put_back = 0.0
-        self._now = 0.0
         self.control = server.scene.add_transform_controls(
             NAME, scale=SIZE, line_width=3.0, depth_test=False, opacity=RESTING_OPACITY
         )
@@ -83,6 +83,7 @@ class SceneGizmo:
         with self._lock:
             if self._client is None and event.phase == "start":
                 self._client = event.client_id
+                self._repeat_later()
             if self._client != event.client_id:
                 return
             self._position[:] = event.target.position
@@ -92,9 +93,19 @@ class SceneGizmo:
                 self._client = None
                 self._followed = self._put_back = 0.0
 
+    def _repeat_later(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = asyncio.get_running_loop().call_later(REPEAT_PERIOD, self._repeat)
+
+    def _repeat(self) -> None:
+        with self._lock:
+            if self._client is not None:
+                self._repeat_later()
+                self._send(clutch=True)
+
     def _send(self, *, clutch: bool) -> None:
         self._sequence += 1
-        self._sent = self._now
         self._link.leader(
             LeaderKind.GIZMO,
             sequence=self._sequence,
@@ -114,7 +125,7 @@ class SceneGizmo:
         *,
         ready: bool,
     ) -> None:
-        """Repeat the held sample, or follow the commanded tip.
+        """Follow the commanded tip, unless somebody holds the gizmo.
 
         A watcher's drag moves only the watcher's own picture (nothing of it arrives here), so the
         pose is written anew once a second even when it did not change.
@@ -126,12 +137,7 @@ class SceneGizmo:
             ready: motion is enabled; otherwise the gizmo is pale.
         """
         with self._lock:
-            self._now = now
-            if self._client is not None:
-                if now - self._sent >= REPEAT_PERIOD:
-                    self._send(clutch=True)
-                return
-            if now - self._followed < FOLLOW_PERIOD:
+            if self._client is not None or now - self._followed < FOLLOW_PERIOD:
                 return
             self._followed = now
             if now - self._put_back >= PUT_BACK_PERIOD:

@@ -34,6 +34,7 @@ class Recorder:
     """A link that hands out one record and keeps the samples."""
 
     def __init__(self, configuration: Configuration) -> None:
+        self.timeout = configuration.teleoperation.gizmo_timeout_ms * 1e-3
         robot = InstrumentRobot(configuration)
         self.kinematics = ForwardKinematics(urdf_text(configuration), robot.parameters)
         self.start: NDArray[np.float64] = robot.initial_state()["x"][0].copy()
@@ -78,7 +79,7 @@ class Recorder:
         assert kind == LeaderKind.GIZMO
         assert not absolute
         assert smoothing_s == pytest.approx(0.05)
-        assert timeout_s == pytest.approx(0.12)
+        assert timeout_s == pytest.approx(self.timeout)
         assert np.linalg.norm(wxyz) == pytest.approx(1.0)
         self.samples.append(Sample(time.monotonic(), sequence, clutch, position))
 
