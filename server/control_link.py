@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import mmap
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +19,6 @@ from server.link_records import (
     HOLD_SLOT,
     LEADER_KINDS,
     LEADER_SLOT,
-    PATH_COLUMNS,
     PATH_START,
     PATH_STOP,
     RECORD_RING_FILE,
@@ -50,9 +48,10 @@ _REQUESTS = frozenset(int(request) for request in Request)
 
 
 class PathStart(NamedTuple):
-    """A path to play: (n, 8) samples (time in s, position in m, w, x, y, z), and its number."""
+    """A path to play: the file of its spline, how many samples it has, and its number."""
 
-    samples: NDArray[np.float64]
+    file: Path
+    rows: int
     path_id: int
 
 
@@ -147,7 +146,9 @@ class ControlLink:
                 self._take_settings(message)
                 continue
             if kind == PATH_START:
-                self.path_start = self._map_path(message)
+                path_id = int(message["path_id"])
+                file = self._directory / path_file(path_id)
+                self.path_start = PathStart(file, int(message["path_rows"]), path_id)
             elif kind == PATH_STOP:
                 self.path_stop = True
             elif kind in _REQUESTS:
@@ -157,16 +158,6 @@ class ControlLink:
     def _take_settings(self, message: NDArray[Any]) -> None:
         self.settings[0] = message["settings"]
         self.settings_changed = True
-
-    def _map_path(self, message: NDArray[Any]) -> PathStart | None:
-        path_id, rows = int(message["path_id"]), int(message["path_rows"])
-        try:
-            with open(self._directory / path_file(path_id), "rb") as file:
-                content = mmap.mmap(file.fileno(), rows * PATH_COLUMNS * 8, access=mmap.ACCESS_READ)
-        except (OSError, ValueError):
-            return None
-        samples = np.frombuffer(content, dtype=np.float64).reshape(rows, PATH_COLUMNS)
-        return PathStart(samples, path_id)
 
     def _poll_web(self, now_ns: int) -> None:
         if self._supervision.update():

@@ -98,7 +98,7 @@ class ControlRequests:
         if state["engaged"] and state["leader_kind"] != LeaderKind.API_TARGET:
             leader = LeaderKind(int(state["leader_kind"])).name.lower()
             raise NotReady(safety_of(record).name, f"the {leader} leads the tip; let it go first")
-        number = self._link.start_path(samples, name)
+        number = await asyncio.to_thread(self._link.start_path, samples, name)
         record = await self._taken_in(number)
         if record["header"]["path_id"][0] == 0:
             raise NotReady(safety_of(record).name, "control did not start the path; see its log")

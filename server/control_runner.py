@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import time
 
@@ -9,10 +10,10 @@ import numpy as np
 
 from robot.records import Request
 from robot.safety import Event, apply_event
-from server.control_link import ControlLink
+from server.control_link import ControlLink, PathStart
 from server.control_loop import ControlLoop
 from server.lifeline import Lifeline
-from server.path_builder import PathBuilder
+from server.mapped_path import MappedPath
 
 _LIFELINE_EVERY_TICKS = 50
 _COLLECT_EVERY_NS = 10_000_000_000
@@ -42,9 +43,6 @@ class ControlRunner:
         # The link writes the active leader's sample right where the loop reads it.
         loop.leader = link.leader
         self._header = loop.record["header"][0]
-        self._paths = PathBuilder()
-        # A path counts as taken in when it plays, and so does what was requested after it.
-        self._answered = link.request_sequence
         self._stopping = False
         self._until_lifeline = _LIFELINE_EVERY_TICKS
         self._collected_ns = 0
@@ -79,7 +77,7 @@ class ControlRunner:
         link.poll(now_ns)
         self._take_in()
         loop.step()
-        self._header["request_sequence"] = self._answered
+        self._header["request_sequence"] = link.request_sequence
         self._header["stamp_ns"] = time.monotonic_ns()
         link.publish(loop.record)
 
@@ -93,15 +91,15 @@ class ControlRunner:
         if released:
             link.release_leaders()
         if released or link.path_stop:
-            self._paths.cancel()
             loop.stop_path()
         if link.path_start is not None:
-            self._paths.start(link.path_start)
-        ready = self._paths.take()
-        if ready is not None and ready.path is not None:
-            loop.start_path(ready.path, ready.path_id)
-        if not self._paths.is_waiting:
-            self._answered = link.request_sequence
+            self._start_path(link.path_start)
+
+    def _start_path(self, wanted: PathStart) -> None:
+        """Play a path; whoever asked sees by the record's ``path_id`` that it plays."""
+        with contextlib.suppress(OSError, ValueError):
+            path = MappedPath(wanted.file, wanted.rows, f"path {wanted.path_id}")
+            self._loop.start_path(path, wanted.path_id)
 
     def _between_ticks(self, deadline_ns: int) -> None:
         """What may be done rarely, in the time left until the next deadline."""

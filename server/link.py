@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from robot.errors import InvalidPose
 from robot.records import RECORD, LeaderKind, Request
-from server.control_link import ControlLink
 from server.link_records import (
     ALIVE,
     ALIVE_FILE,
@@ -51,8 +50,6 @@ from server.mapped import MappedReadError, MappedRing, MappedSlot
 
 _PATHS_FILE = "paths.json"
 _SMALLEST_QUATERNION = 1e-6
-
-__all__ = ["ControlLink", "WebLink"]
 
 
 class WebLink:
@@ -109,6 +106,8 @@ class WebLink:
     def start_path(self, samples: NDArray[np.float64], name: str) -> int:
         """Send a path and start it; returns the number to wait for.
 
+        Takes about 1 ms for every 1000 samples: an event loop should leave it to a thread.
+
         Args:
             samples: (n >= 2, 8), columns time in s, increasing from 0, position in m, quaternion
                 w, x, y, z.
@@ -119,9 +118,12 @@ class WebLink:
         """
         rows = np.ascontiguousarray(samples, dtype=np.float64)
         _check_path(rows)
+        from server.mapped_path import MappedPath
+
+        content = MappedPath.file_bytes(rows)
         with self._lock:
             path_id = max(self._paths, default=0) + 1
-            self._write_file(path_file(path_id), rows.tobytes())
+            self._write_file(path_file(path_id), content)
             self._paths[path_id] = name
             self._write_file(_PATHS_FILE, json.dumps(self._paths).encode())
             with contextlib.suppress(OSError):

@@ -110,7 +110,7 @@ def leader_file(kind: LeaderKind) -> str:
 
 
 def path_file(path_id: int) -> str:
-    """Name of the file that holds a path's samples as plain float64 rows."""
+    """Name of the file that holds a path's spline as plain float64."""
     return f"path_{path_id}.f8"
 
 

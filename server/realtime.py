@@ -17,13 +17,13 @@ PRIORITY = 60
 
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 _PR_SET_TIMERSLACK = 29
-_SWITCH_INTERVAL_S = 2e-4
 
 
 def enter(wanted: str) -> str:
     """Make the calling thread a real-time thread and lock the memory of its process.
 
-    Threads that are to stay ordinary must have been started before.
+    Threads that it starts later are ordinary ones. An ordinary thread that holds the interpreter
+    when the system puts it aside makes this one wait: start none that does more than wait itself.
 
     Args:
         wanted: "auto" to do what is permitted, "off" to do nothing.
@@ -31,8 +31,6 @@ def enter(wanted: str) -> str:
     Returns:
         "SCHED_FIFO", with what is missing beside it, or "off: " and the reason.
     """
-    # A thread that prepares data must hand the interpreter over at once, not after 5 ms.
-    sys.setswitchinterval(_SWITCH_INTERVAL_S)
     _quiet_collector()
     if wanted == "off":
         return "off: switched off in the configuration ([control] realtime)"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from robot.errors import InvalidPose
 from robot.records import RECORD, SETTINGS, LeaderKind, Request
+from scenes.path import Path as ScenePath
 from server.control_link import HOLD_TIMEOUT_NS, WEB_TIMEOUT_NS, ControlLink
 from server.link import WebLink
 from server.link_records import (
@@ -24,6 +25,7 @@ from server.link_records import (
     create_mapped_files,
 )
 from server.mapped import MappedReadError, MappedSlot
+from server.mapped_path import MappedPath
 
 SECOND_NS = 1_000_000_000
 
@@ -248,6 +250,7 @@ def test_opening_the_web_side_anew_opens_every_clutch(directory: Path) -> None:
 def rows(count: int) -> NDArray[np.float64]:
     samples = np.zeros((count, 8))
     samples[:, 0], samples[:, 4] = np.arange(count), 1.0
+    samples[:, 1] = np.sin(samples[:, 0])
     return samples
 
 
@@ -258,7 +261,12 @@ def test_a_path_arrives_with_its_number_and_name(
         number = web.start_path(rows(5), name)
         poll(control)
         assert control.path_start is not None
-        assert control.path_start.samples.tolist() == rows(5).tolist()
+        file, rows_given, _ = control.path_start
+        at, expected = np.empty(7), np.empty(7)
+        for time_s in (0.0, 0.7, 3.9, 9.0):
+            MappedPath(file, rows_given, name).at(time_s, at)
+            ScenePath(rows(5), name).at(time_s, expected)
+            assert at.tolist() == expected.tolist()
         assert control.request_sequence == number
         assert web.status()["paths"][control.path_start.path_id] == name
     assert WebLink(directory).status()["paths"] == {1: "first", 2: "second", 3: "third"}
@@ -308,3 +316,13 @@ def test_the_status_tells_starting_running_and_down(
     # The next process has not spoken yet: what the last one said does not count for it.
     supervise(directory, control=int(ControlState.STARTING), control_pid=12)
     assert web.status()["control"] == "starting"
+
+
+def test_a_file_too_short_for_a_path_is_none(web: WebLink, control: ControlLink) -> None:
+    web.start_path(rows(5), "cut")
+    poll(control)
+    assert control.path_start is not None
+    with control.path_start.file.open("r+b") as file:
+        file.truncate(100)
+    with pytest.raises(ValueError, match="size"):
+        MappedPath(control.path_start.file, control.path_start.rows, "cut")
