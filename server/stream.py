@@ -156,7 +156,10 @@ class StreamClient:
                 await self._websocket.send_text(text)
             while self._problems:
                 await self._websocket.send_text(self._problems.popleft())
-            deadline = max(deadline + self._period_s, time.monotonic())
+            deadline += self._period_s
+            if deadline < time.monotonic():
+                # What was missed is not made up for: it would be the same state twice.
+                deadline = time.monotonic() + self._period_s
             await asyncio.sleep(deadline - time.monotonic())
 
     async def _receive(self, presence: Presence) -> None:
