@@ -75,7 +75,7 @@ class ApiClient:
     def forget_lease(self) -> None:
         self.http.headers.pop("X-Keyhole-Lease", None)
 
-    def until(self, condition: Callable[[JSON], Any], what: str, within_s: float = 5.0) -> JSON:
+    def until(self, condition: Callable[[JSON], Any], what: str, within_s: float = 10.0) -> JSON:
         """The first state for which ``condition`` holds; keeps the lease meanwhile."""
         ends = time.monotonic() + within_s
         while time.monotonic() < ends:
