@@ -22,7 +22,7 @@ from websockets.sync.connection import Connection
 from websockets.typing import Subprotocol
 
 from server.viser_messages import LARGEST_MESSAGE, ViserFilter
-from tests.server.api_client import ApiClient
+from tests.server.api_client import JSON, ApiClient
 from tests.server.console_process import ConsoleProcess, eventually
 
 GIZMO = "/gizmo"
@@ -210,19 +210,22 @@ def test_another_protocol_is_not_passed_on(watcher: ApiClient) -> None:
         Scene(watcher, Subprotocol("something-else"))
 
 
-def dragged(scene: Scene, start: np.ndarray, millimetres: int) -> None:
-    """Drag the gizmo along y in steps of 1 mm, as fast as a browser does."""
+def dragged(scene: Scene, state: JSON, millimetres: int) -> None:
+    """Drag the gizmo from the tip along y in steps of 1 mm, as fast as a browser does."""
+    start = np.array(state["true"]["position_mm"]) * 1e-3
     scene.send(START)
     for step in range(millimetres + 1):
-        scene.send(drag(start + np.array([0.0, 1e-3 * step, 0.0])))
+        position = start + np.array([0.0, 1e-3 * step, 0.0])
+        scene.send(drag(position, state["true"]["orientation_wxyz"]))
         time.sleep(0.05)
 
 
 def test_the_operators_gizmo_moves_the_tip(scene: Scene, driver: ApiClient) -> None:
-    start = np.array(driver.state()["true"]["position_mm"])
-    dragged(scene, start * 1e-3, 8)
+    before = driver.state()
+    dragged(scene, before, 8)
     state = driver.until(
-        lambda s: abs(s["true"]["position_mm"][1] - start[1] - 8.0) < 0.1, "8 mm along y"
+        lambda s: abs(s["true"]["position_mm"][1] - before["true"]["position_mm"][1] - 8.0) < 0.1,
+        "8 mm along y",
     )
     assert state["leader"] == "gizmo"
     assert state["errors"]["rcm_mm"] <= 0.001
@@ -235,7 +238,7 @@ def test_the_operators_gizmo_moves_the_tip(scene: Scene, driver: ApiClient) -> N
 def test_a_watchers_gizmo_moves_nothing(driver: ApiClient, watcher: ApiClient) -> None:
     before = driver.state()
     scene = Scene(watcher)
-    dragged(scene, np.array(before["true"]["position_mm"]) * 1e-3, 8)
+    dragged(scene, before, 8)
     after = driver.state()
     scene.send(END)
     scene.socket.close()
@@ -244,7 +247,7 @@ def test_a_watchers_gizmo_moves_nothing(driver: ApiClient, watcher: ApiClient) -
 
 
 def test_closing_the_scene_mid_drag_lets_go(scene: Scene, driver: ApiClient) -> None:
-    dragged(scene, np.array(driver.state()["true"]["position_mm"]) * 1e-3, 3)
+    dragged(scene, driver.state(), 3)
     driver.until(lambda s: s["engaged"], "dragging")
     scene.socket.socket.shutdown(socket.SHUT_RDWR)
     began = time.monotonic()
@@ -253,7 +256,7 @@ def test_closing_the_scene_mid_drag_lets_go(scene: Scene, driver: ApiClient) -> 
 
 
 def test_losing_the_lease_mid_drag_lets_go(scene: Scene, driver: ApiClient) -> None:
-    dragged(scene, np.array(driver.state()["true"]["position_mm"]) * 1e-3, 3)
+    dragged(scene, driver.state(), 3)
     driver.until(lambda s: s["engaged"], "dragging")
     driver.done("DELETE", "/lease")
     driver.forget_lease()
