@@ -28,21 +28,23 @@ from robot.start import start_configuration
 from robot.urdf import urdf_text
 
 
-class _Plans:
-    """The presets as padded arrays, so that the compiled tick picks one by its number."""
+def _padded(plans: tuple[Plan, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The presets as arrays, so that the compiled tick picks one by its number.
 
-    def __init__(self, plans: tuple[Plan, ...]) -> None:
-        count = len(plans)
-        self.sizes = np.zeros((count, 2), dtype=np.int64)
-        self.rows = np.zeros((count, 10), dtype=np.int64)
-        self.weights = np.zeros((count, 10))
-        self.starts = np.zeros((count, 11), dtype=np.int64)
-        for index, one in enumerate(plans):
-            rows, levels = len(one.rows), len(one.starts) - 1
-            self.sizes[index] = rows, levels
-            self.rows[index, :rows] = one.rows
-            self.weights[index, :rows] = one.weights
-            self.starts[index, : levels + 1] = one.starts
+    Returns:
+        Rows and levels (cases, 2), catalogue rows (cases, 10), weights (cases, 10), first row of
+        each level (cases, 11).
+    """
+    count = len(plans)
+    sizes, rows = np.zeros((count, 2), dtype=np.int64), np.zeros((count, 10), dtype=np.int64)
+    weights, starts = np.zeros((count, 10)), np.zeros((count, 11), dtype=np.int64)
+    for index, one in enumerate(plans):
+        used, levels = len(one.rows), len(one.starts) - 1
+        sizes[index] = used, levels
+        rows[index, :used] = one.rows
+        weights[index, :used] = one.weights
+        starts[index, : levels + 1] = one.starts
+    return sizes, rows, weights, starts
 
 
 class _Work:
@@ -77,7 +79,7 @@ class InstrumentRobot:
         self._work = _Work()
         length = configuration.priority.characteristic_length_m
         plans = tuple(plan(PRESETS[case], length) for case in Case)
-        self._plans = _Plans(plans)
+        self._plans = _padded(plans)
         self._problems = tuple(
             LexicographicProblem(one, self._work.matrix, self._work.upper, self._work.lower)
             for one in plans
@@ -100,16 +102,13 @@ class InstrumentRobot:
             tick_input: (1,) ``INPUT``.
             outcome: (1,) ``OUTCOME``, filled: next state, command, report.
         """
-        work, plans = self._work, self._plans
+        work = self._work
         left = decide_and_prepare(
             state,
             tick_input,
             self.parameters,
             outcome,
-            plans.sizes,
-            plans.rows,
-            plans.weights,
-            plans.starts,
+            self._plans,
             work.catalogue,
             work.targets,
             work.preferred,

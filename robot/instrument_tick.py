@@ -12,7 +12,7 @@ from robot.instrument import project_on_shaft, rcm_jacobian, shaft, tip, tip_jac
 from robot.priority.levels import assemble
 from robot.priority.limits import active_limits, rate_limits
 from robot.priority.meet_all import meet_all
-from robot.records import Case, Safety, Solver
+from robot.records import Case, LeaderKind, Safety, Solver
 from robot.rotations import angle_between, quaternion_from_matrix
 from robot.safety import Event, apply_event, decide
 from robot.segment import polar
@@ -28,6 +28,7 @@ NOT_FINITE = -100
 _ENABLED = int(Safety.ENABLED)
 _HQP, _AUGMENTED = int(Solver.HQP), int(Solver.AUGMENTED)
 _SOLVER_FAILED = int(Event.SOLVER_FAILED)
+_PATH = int(LeaderKind.PATH)
 _BALANCED = int(Case.BALANCED)
 _CORRECTIONS_PER_TICK = 0.5
 """Largest share of the deviation at the trocar that one tick takes back."""
@@ -199,15 +200,50 @@ def integrate(
 
 
 @compiled
+def _trocar_moves(tick_input: np.ndarray) -> bool:
+    velocity = tick_input[0].trocar_velocity
+    return bool(velocity[0] != 0.0 or velocity[1] != 0.0 or velocity[2] != 0.0)
+
+
+@compiled
+def _levels_and_limits(
+    outcome: np.ndarray,
+    tick_input: np.ndarray,
+    parameters: np.ndarray,
+    plans: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    catalogue: np.ndarray,
+    targets: np.ndarray,
+    matrix: np.ndarray,
+    upper: np.ndarray,
+    lower: np.ndarray,
+) -> int:
+    """Write the bounds of the rates, the bend row, the case's levels; how many rows these have."""
+    sizes, rows, weights, starts = plans
+    case = tick_input[0].settings.case
+    count, levels = sizes[case, 0], sizes[case, 1]
+    x, dt = outcome[0].state.x, tick_input[0].dt_s
+    upper[10] = rate_limits(x, dt, parameters, lower, upper, matrix[0])
+    assemble(
+        catalogue,
+        targets,
+        rows[case, :count],
+        weights[case, :count],
+        starts[case, : levels + 1],
+        matrix[1:],
+        upper[11:],
+    )
+    for row in range(11, 11 + count):
+        lower[row] = upper[row]
+    return int(count)
+
+
+@compiled
 def decide_and_prepare(
     state: np.ndarray,
     tick_input: np.ndarray,
     parameters: np.ndarray,
     outcome: np.ndarray,
-    plan_sizes: np.ndarray,
-    plan_rows: np.ndarray,
-    plan_weights: np.ndarray,
-    plan_starts: np.ndarray,
+    plans: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     catalogue: np.ndarray,
     targets: np.ndarray,
     preferred: np.ndarray,
@@ -223,10 +259,8 @@ def decide_and_prepare(
         tick_input: (1,).
         parameters: (1,).
         outcome: (1,) filled.
-        plan_sizes: (cases, 2) rows and levels of each preset.
-        plan_rows: (cases, 10) catalogue rows of each preset.
-        plan_weights: (cases, 10) their weights.
-        plan_starts: (cases, 11) first row of each level.
+        plans: of each preset, rows and levels (cases, 2); catalogue rows (cases, 10); their
+            weights (cases, 10); first row of each level (cases, 11).
         catalogue: (10, 10) filled with the task rows.
         targets: (10,) filled with their wanted rates.
         preferred: (10,) filled with the preferred rates.
@@ -241,50 +275,28 @@ def decide_and_prepare(
     _begin(state, outcome)
     s = outcome[0].state
     i_ = tick_input[0]
-    previous_position = s.desired_position.copy()
-    previous_rotation = s.desired_rotation.copy()
+    position, rotation = s.desired_position.copy(), s.desired_rotation.copy()
     just_enabled = decide(outcome, tick_input, parameters)
     engaged = follow(outcome, tick_input, parameters)
     if just_enabled or s.safety != _ENABLED:
         return DONE
-    still = i_.trocar_velocity[0] == 0.0 and i_.trocar_velocity[1] == 0.0
-    if not engaged and still and i_.trocar_velocity[2] == 0.0:
+    if not engaged and not _trocar_moves(tick_input):
         return DONE
-    _tasks(
-        outcome,
-        tick_input,
-        parameters,
-        previous_position,
-        previous_rotation,
-        catalogue,
-        targets,
-        preferred,
-    )
+    _tasks(outcome, tick_input, parameters, position, rotation, catalogue, targets, preferred)
     square = 0.0
-    for i in range(3):
-        square += (previous_position[i] - s.tip_position[i]) ** 2
+    for k in range(3):
+        square += (position[k] - s.tip_position[k]) ** 2
     left_over[0] = math.sqrt(square)
-    left_over[1] = angle_between(previous_rotation, s.tip_rotation)
-    case = i_.settings.case
-    rows, levels = plan_sizes[case, 0], plan_sizes[case, 1]
-    upper[10] = rate_limits(s.x, i_.dt_s, parameters, lower, upper, matrix[0])
-    assemble(
-        catalogue,
-        targets,
-        plan_rows[case, :rows],
-        plan_weights[case, :rows],
-        plan_starts[case, : levels + 1],
-        matrix[1:],
-        upper[11:],
+    left_over[1] = angle_between(rotation, s.tip_rotation)
+    rows = _levels_and_limits(
+        outcome, tick_input, parameters, plans, catalogue, targets, matrix, upper, lower
     )
-    for r in range(11, 11 + rows):
-        lower[r] = upper[r]
     if i_.settings.solver != _HQP:
-        return SOLVE_CLOSED_FORM + int(case)
+        return SOLVE_CLOSED_FORM + int(i_.settings.case)
     rates = np.empty(10)
     levels_matrix, levels_target = matrix[1 : 1 + rows], upper[11 : 11 + rows]
     if not meet_all(levels_matrix, levels_target, preferred, lower, upper, matrix[0], rates):
-        return SOLVE_QP + int(case)
+        return SOLVE_QP + int(i_.settings.case)
     integrate(
         outcome, tick_input, 1, rates, catalogue, targets, lower, upper, matrix[0], parameters
     )
@@ -323,9 +335,15 @@ def conclude(
     servo_angles(s.x[7], s.x[8], p.pitch_radius, p.pulley_radius, command.servo)
     report.x[:] = s.x
     report.theta, report.delta = polar(s.x[7], s.x[8])
-    report.desired_position[:] = s.desired_position
+    leader = tick_input[0].leader
+    if s.engaged != 0 and leader.kind == _PATH:
+        # The errors of a path are against the path, even where speed limits make the tip lag.
+        report.desired_position[:] = leader.position
+        report.desired_wxyz[:] = leader.wxyz
+    else:
+        report.desired_position[:] = s.desired_position
+        quaternion_from_matrix(s.desired_rotation, report.desired_wxyz)
     report.commanded_position[:] = s.tip_position
-    quaternion_from_matrix(s.desired_rotation, report.desired_wxyz)
     quaternion_from_matrix(s.tip_rotation, report.commanded_wxyz)
 
 

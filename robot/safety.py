@@ -229,6 +229,8 @@ def decide(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) 
         return True
     if not tracking_distance(s.x, i.measured_q) <= p.tracking_error:
         apply_event(outcome, _TRACKING)
-    if s.safety == _ENABLED and s.engaged != 0 and not i.leader.age_s <= i.leader.timeout_s:
+    # A leader that opened its clutch or gave way to another has left; its age is no matter.
+    leads = s.engaged != 0 and i.leader.clutch != 0 and i.leader.kind == s.leader_kind
+    if leads and not i.leader.age_s <= i.leader.timeout_s:
         apply_event(outcome, _STALE)
     return False

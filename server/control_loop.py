@@ -24,6 +24,7 @@ from robot.records import (
     ErrorSource,
     LeaderKind,
     Request,
+    Safety,
     Solver,
 )
 from robot.rotations import matrix_from_quaternion, multiply, quaternion_from_matrix
@@ -152,7 +153,8 @@ class ControlLoop:
         path, state = self._path, self._state
         if path is None:
             return
-        if self._path_time_ns >= round(path.duration_s * 1e9):
+        ended = self._path_time_ns >= round(path.duration_s * 1e9)
+        if ended or state["safety"][0] != Safety.ENABLED:
             self.stop_path()
         elif state["engaged"][0]:
             self._path_time_ns += self._dt_ns

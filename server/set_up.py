@@ -161,7 +161,11 @@ def _build(digest: str, lock: int) -> None:
     _say(f"setting up .venv with Python {version}, once; this takes about a minute")
     # Inside an outdated .venv its own interpreter runs this file.
     base = getattr(sys, "_base_executable", sys.executable)
-    _run([base, "-I", "-m", "venv", "--prompt", "keyhole", str(aside)], "making the environment", lock)
+    _run(
+        [base, "-I", "-m", "venv", "--prompt", "keyhole", str(aside)],
+        "making the environment",
+        lock,
+    )
     builders: list[str] = _project()["build-system"]["requires"]
     if builders:
         _pip(aside, builders, "installing what builds the package", lock)
