@@ -1,0 +1,96 @@
+"""The page itself: who is let in, what it says, how it is laid out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import BrowserContext, expect
+
+from tests.browser_tests.conftest import Complaints
+from tests.browser_tests.console_page import SLOW_S, ConsolePage
+from tests.server.console_process import ConsoleProcess, eventually
+
+LAYOUT_FAULTS = (Path(__file__).parent / "layout_faults.js").read_text(encoding="utf-8")
+SLIP_IN = """() => {
+  const script = document.createElement("script");
+  script.textContent = "window.slippedIn = 'a script'";
+  document.body.append(script);
+}"""
+SIZES = [(1280, 800), (1920, 1080)]
+
+
+@pytest.mark.parametrize("query", ["", "?token=wrong"])
+def test_without_the_token_a_page_tells_how_to_get_in(
+    fresh_context: BrowserContext, console: ConsoleProcess, query: str
+) -> None:
+    page = fresh_context.new_page()
+    answer = page.goto(f"{console.base}/{query}")
+    assert answer is not None
+    assert answer.status == 401
+    expect(page.locator("h1")).to_have_text("This console needs its token")
+    expect(page.locator("body")).to_contain_text("/?token=")
+    assert not fresh_context.cookies()
+
+
+def test_the_token_leaves_the_address_and_the_policy_is_in_force(
+    fresh_context: BrowserContext, console: ConsoleProcess, complaints: Complaints
+) -> None:
+    page = fresh_context.new_page()
+    answer = page.goto(f"{console.base}/?token={console.token}")
+    assert answer is not None
+    assert page.url == f"{console.base}/"
+    policy = answer.headers["content-security-policy"]
+    assert "default-src 'none'" in policy
+    assert "script-src 'self';" in policy
+    cookie = fresh_context.cookies()[0]
+    assert cookie["httpOnly"]
+    assert cookie["sameSite"] == "Strict"
+    page.evaluate(SLIP_IN)
+    assert page.evaluate("() => window.slippedIn ?? 'nothing'") == "nothing"
+    eventually(lambda: page.evaluate("1") and complaints.found, "the browser complains", SLOW_S)
+    assert all("Content Security Policy" in one for one in complaints.found)
+    complaints.found.clear()
+    expect(page.get_by_text("Research software, not a medical device").first).to_be_visible()
+    expect(page.locator("#safety-state")).not_to_have_text("CONNECTING")
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_nothing_overlaps_is_cut_or_pale(
+    operator: ConsolePage, console: ConsoleProcess, size: tuple[int, int], theme: str
+) -> None:
+    page = operator.page
+    before = page.viewport_size
+    assert before is not None
+
+    def faults() -> list[str]:
+        found = page.evaluate(LAYOUT_FAULTS)
+        assert isinstance(found, list)
+        return found
+
+    try:
+        page.set_viewport_size({"width": size[0], "height": size[1]})
+        page.emulate_media(color_scheme=theme)  # type: ignore[arg-type]
+        assert operator.call("POST", "/path", {"experiment": "circle"}) == 200
+        eventually(lambda: operator.shown()["path"], "a path plays", SLOW_S)
+        eventually(lambda: not faults(), "no fault", 5.0)
+    finally:
+        page.emulate_media(color_scheme="light")
+        page.set_viewport_size(before)
+
+
+def test_the_documentation_of_the_api_needs_no_other_host(
+    fresh_context: BrowserContext, console: ConsoleProcess
+) -> None:
+    page = fresh_context.new_page()
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(f"{console.base}/?token={console.token}")
+    page.goto(f"{console.base}/docs")
+    expect(page.get_by_text("/api/v1/robots/instrument/emergency-stop")).to_be_visible()
+    page.get_by_text("/api/v1/robots/instrument/lease", exact=True).first.click()
+    expect(page.get_by_role("button", name="Execute")).to_be_visible()
+    own = [url for url in asked if url.startswith(f"{console.base}/")]
+    assert f"{console.base}/openapi.json" in own
+    assert [url for url in asked if url not in own and not url.startswith("data:")] == []

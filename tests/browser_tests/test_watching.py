@@ -1,0 +1,77 @@
+"""A second browser sees everything and moves nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from playwright.sync_api import BrowserContext, expect
+
+from benchmarks.console import ROBOT
+from tests.browser_tests.console_page import SLOW_S, ConsolePage
+from tests.browser_tests.test_driving import tip_of
+from tests.server.console_process import ConsoleProcess, eventually
+
+
+@pytest.fixture
+def watcher(fresh_context: BrowserContext, console: ConsoleProcess) -> ConsolePage:
+    """Another person's browser, with the token and a scene of its own."""
+    page = ConsolePage(fresh_context, console)
+    page.wait_for_scene()
+    return page
+
+
+def test_a_second_browser_watches_and_cannot_drive(
+    operator: ConsolePage, watcher: ConsolePage, console: ConsoleProcess
+) -> None:
+    operator.settle()
+    page = watcher.page
+    watcher.until("ENABLED")
+    expect(page.locator("#operator-role")).to_have_text("Watching")
+    name = console.state()["operator"]["name"]
+    expect(page.locator("#watcher-note")).to_contain_text(name)
+    for button in ("Disable", "Play path", "Align with view"):
+        expect(page.get_by_role("button", name=button)).to_have_attribute("aria-disabled", "true")
+    for control in page.locator("input.drive, select.drive").all():
+        expect(control).to_be_disabled()
+    expect(page.locator("#emergency-stop")).to_be_enabled()
+    watcher.button("Take control").click()
+    expect(page.get_by_role("alert").filter(has_text=name)).to_be_visible()
+
+    start, drawn = tip_of(console.state()), np.array(watcher.gizmo_mm())
+    with watcher.pulling(0, 8.0):
+        eventually(
+            lambda: np.linalg.norm(np.array(watcher.gizmo_mm()) - drawn) > 4.0,
+            "the watcher's own picture follows its mouse",
+            SLOW_S,
+        )
+        assert not console.state()["engaged"]
+    eventually(
+        lambda: np.allclose(watcher.gizmo_mm(), drawn, atol=0.2), "the gizmo is put back", SLOW_S
+    )
+    page.keyboard.press("x")
+    state = console.state()
+    assert tip_of(state) == pytest.approx(start, abs=1e-3)
+    assert state["safety"]["state"] == "ENABLED"
+    assert state["operator"]["name"] == name
+
+
+def test_the_api_refuses_a_watcher_to_drive(
+    operator: ConsolePage, fresh_context: BrowserContext, console: ConsoleProcess
+) -> None:
+    watcher = ConsolePage(fresh_context, console)
+    start = tip_of(console.state())
+    for path, body in (
+        ("/target", {"position_mm": [start[0] + 2.0, start[1], start[2]]}),
+        ("/leader", {"position_mm": [0, 0, 0], "orientation_wxyz": [1, 0, 0, 0], "clutch": True}),
+        ("/path", {"experiment": "circle"}),
+        ("/disable", None),
+    ):
+        answer = fresh_context.request.post(f"{console.base}{ROBOT}{path}", data=body)
+        assert answer.status == 403
+        assert answer.json()["code"] == "not_the_operator"
+    assert watcher.call("PUT", "/priority", {"case": "2"}) == 403
+    state = console.state()
+    assert tip_of(state) == pytest.approx(start, abs=1e-3)
+    assert state["safety"]["state"] == "ENABLED"
+    assert state["priority"]["case"] == "1"
+    assert operator.shown()["operator"]["you"]
