@@ -134,10 +134,9 @@ def test_a_path_counts_as_taken_in_when_it_plays(running: Running) -> None:
     record = taken_in(link, link.start_path(samples, "wave"))
     assert link.status()["paths"][int(record["header"]["path_id"][0])] == "wave"
     eventually(lambda: is_moving(link), "the tip moves")
-    ask(link, Request.PAUSE)
-    assert link.snapshot()["header"]["path_id"][0] != 0
-    ask(link, Request.DISABLE)
-    assert link.snapshot()["header"]["path_id"][0] == 0
+    assert ask(link, Request.PAUSE)["header"]["path_id"][0] == 0
+    ask(link, Request.ENABLE)
+    assert not is_moving(link)
 
 
 def test_records_are_numbered_and_on_time(running: Running) -> None:
