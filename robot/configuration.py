@@ -10,7 +10,7 @@ import hashlib
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from robot.errors import ConfigurationError
 
@@ -30,6 +30,14 @@ def _unit(value: Vector) -> Vector:
     return (value[0] / norm, value[1] / norm, value[2] / norm)
 
 
+def _not_zero(value: Vector) -> Vector:
+    _unit(value)
+    return value
+
+
+Direction = Annotated[Vector, AfterValidator(_not_zero)]
+
+
 class Section(BaseModel):
     """A table of the configuration: unknown keys are refused, values cannot be changed later."""
 
@@ -40,7 +48,7 @@ class Trocar(Section):
     """Where the shaft passes the body wall (base frame), and the wall's looks."""
 
     position_m: Vector
-    wall_normal: Vector
+    wall_normal: Direction
     wall_radius_m: Length
     wall_thickness_m: Length
 
@@ -48,11 +56,18 @@ class Trocar(Section):
 class Start(Section):
     """The configuration in which the robot wakes up."""
 
-    shaft_direction: Vector
-    bend_direction_up: Vector
+    shaft_direction: Direction
+    bend_direction_up: Direction
     bend_deg: Annotated[float, Field(ge=0, le=170)]
     direction_deg: Annotated[float, Field(ge=-360, le=360)]
     lambda_along_shaft: Annotated[float, Field(gt=0, lt=1)]
+
+    @model_validator(mode="after")
+    def _up_is_not_along_the_shaft(self) -> Start:
+        shaft, up = _unit(self.shaft_direction), _unit(self.bend_direction_up)
+        if abs(sum(a * b for a, b in zip(shaft, up, strict=True))) > 0.999:
+            raise ValueError("bend_direction_up must not point along shaft_direction")
+        return self
 
 
 class Instrument(Section):
@@ -78,8 +93,8 @@ class Module(Section):
     """The instrument module on the flange: where the shaft leaves, pulleys, servos."""
 
     shaft_base_m: Vector
-    shaft_direction: Vector
-    bend_direction: Vector
+    shaft_direction: Direction
+    bend_direction: Direction
     pulley_radius_m: Length
     servo_ticks_per_turn: Annotated[int, Field(ge=64, le=2**22)]
     servo_range_deg: Annotated[float, Field(gt=0, le=360)]
@@ -130,6 +145,14 @@ class Commands(Section):
     orientation_threshold_deg: Positive
     orientation_ramp: Annotated[float, Field(gt=1)]
     rcm_gain_per_s: Annotated[float, Field(ge=0, le=1000)]
+
+    @model_validator(mode="after")
+    def _slowest_below_fastest(self) -> Commands:
+        if self.speed_min_mm_s > self.speed_max_mm_s:
+            raise ValueError("speed_min_mm_s must not exceed speed_max_mm_s")
+        if self.angular_speed_min_deg_s > self.angular_speed_max_deg_s:
+            raise ValueError("angular_speed_min_deg_s must not exceed angular_speed_max_deg_s")
+        return self
 
 
 class Priority(Section):
@@ -260,7 +283,6 @@ def parse(table: dict[str, Any], file: str) -> Configuration:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         key = ".".join(str(part) for part in first["loc"]) or "(whole file)"
-        value = "(missing)" if first["type"] == "missing" else first["input"]
-        if isinstance(value, (dict, Section)):
-            value = "(table)"
-        raise ConfigurationError(file, key, value, first["msg"]) from None
+        allowed = first["msg"].removeprefix("Value error, ")
+        whole = isinstance(first["input"], dict) or first["type"] == "missing"
+        raise ConfigurationError(file, key, None if whole else first["input"], allowed) from None

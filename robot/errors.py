@@ -19,14 +19,15 @@ class ConfigurationError(KeyholeError):
     Attributes:
         file: where the value was read from.
         key: dotted key, for example ``limits.bend_deg``.
-        value: the refused value.
+        value: the refused value; None where it is missing or the whole table is meant.
         allowed: the allowed range or form in words.
     """
 
     code = "configuration"
 
     def __init__(self, file: str, key: str, value: object, allowed: str) -> None:
-        super().__init__(f"{file}: {key} = {value!r} is refused: {allowed}")
+        written = "" if value is None else f" = {value!r}"
+        super().__init__(f"{file}: {key}{written} is refused: {allowed}")
         self.file, self.key, self.value, self.allowed = file, key, value, allowed
 
 

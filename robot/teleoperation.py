@@ -35,7 +35,7 @@ from robot.safety import Event, apply_event
 _ENABLED = int(Safety.ENABLED)
 _MATCHED = int(Alignment.MATCHED)
 _JUMP, _INVALID = int(Event.LEADER_JUMP), int(Event.LEADER_INVALID)
-_PATH = int(LeaderKind.PATH)
+_GIZMO, _PATH = int(LeaderKind.GIZMO), int(LeaderKind.PATH)
 _TOO_FAR, _NOT_ALIGNED, _NO_HOLD = (
     int(Refusal.TARGET_TOO_FAR),
     int(Refusal.NOT_ALIGNED),
@@ -60,32 +60,45 @@ def _valid(leader: RecordFields) -> bool:
 
 
 @compiled
-def _settings_changed(s: RecordFields, settings: RecordFields) -> bool:
+def _rotation_base_leader(leader: RecordFields, settings: RecordFields, out: np.ndarray) -> None:
+    """What turns the leader's motion into the base frame; the gizmo moves in the base frame."""
+    for i in range(3):
+        for j in range(3):
+            if leader.kind == _GIZMO:
+                out[i, j] = 1.0 if i == j else 0.0
+            else:
+                out[i, j] = settings.rotation_base_leader[i, j]
+
+
+@compiled
+def _settings_changed(s: RecordFields, leader: RecordFields, settings: RecordFields) -> bool:
     if s.anchor_scale != settings.motion_scale:
         return True
     if s.anchor_lock_rotation != settings.lock_rotation:
         return True
     if s.anchor_lock_translation != settings.lock_translation:
         return True
+    turn = np.empty((3, 3))
+    _rotation_base_leader(leader, settings, turn)
     for i in range(3):
         for j in range(3):
-            if s.anchor_rotation_base_leader[i, j] != settings.rotation_base_leader[i, j]:
+            if s.anchor_rotation_base_leader[i, j] != turn[i, j]:
                 return True
     return False
 
 
 @compiled
 def _anchor(
-    s: RecordFields, settings: RecordFields, position: np.ndarray, rotation: np.ndarray
+    s: RecordFields, leader: RecordFields, settings: RecordFields, rotation: np.ndarray
 ) -> None:
     """Take the leader's pose and the desired pose as the pair that belongs together."""
+    _rotation_base_leader(leader, settings, s.anchor_rotation_base_leader)
     for i in range(3):
-        s.anchor_leader_position[i] = position[i]
+        s.anchor_leader_position[i] = leader.position[i]
         s.anchor_tip_position[i] = s.desired_position[i]
         for j in range(3):
             s.anchor_leader_rotation[i, j] = rotation[i, j]
             s.anchor_tip_rotation[i, j] = s.desired_rotation[i, j]
-            s.anchor_rotation_base_leader[i, j] = settings.rotation_base_leader[i, j]
     s.anchor_scale = settings.motion_scale
     s.anchor_lock_rotation = settings.lock_rotation
     s.anchor_lock_translation = settings.lock_translation
@@ -182,7 +195,9 @@ def _may_engage(
         return True
     if settings.alignment == _MATCHED:
         in_base = np.empty((3, 3))
-        multiply(settings.rotation_base_leader, rotation, in_base)
+        turn = np.empty((3, 3))
+        _rotation_base_leader(leader, settings, turn)
+        multiply(turn, rotation, in_base)
         if angle_between(in_base, s.tip_rotation) > p.alignment_tolerance:
             outcome[0].report.target_refused = _NOT_ALIGNED
             return False
@@ -206,7 +221,7 @@ def _engage_or_check(
             return False
         s.engaged = 1
         s.leader_kind = leader.kind
-        _anchor(s, settings, leader.position, rotation)
+        _anchor(s, leader, settings, rotation)
         return True
     if leader.absolute != 0 or leader.sequence == s.leader_sequence:
         return True
@@ -275,8 +290,8 @@ def follow(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) 
     matrix_from_quaternion(leader.wxyz, rotation)
     if not _engage_or_check(outcome, leader, settings, p, rotation):
         return False
-    if _settings_changed(s, settings):
-        _anchor(s, settings, leader.position, rotation)
+    if _settings_changed(s, leader, settings):
+        _anchor(s, leader, settings, rotation)
     s.leader_sequence = leader.sequence
     for i in range(3):
         s.leader_position[i] = leader.position[i]

@@ -18,7 +18,7 @@ from server.mapped_path import MappedPath
 _LIFELINE_EVERY_TICKS = 50
 _COLLECT_EVERY_NS = 10_000_000_000
 _COLLECT_SLACK_NS = 1_000_000
-_KEEPS_LEADING = (Request.NONE, Request.ENABLE, Request.PAUSE)
+_KEEPS_LEADING = (Request.NONE, Request.ENABLE)
 """After any other request nothing that led before may go on by itself when motion is allowed."""
 
 

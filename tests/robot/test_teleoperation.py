@@ -245,6 +245,20 @@ def test_another_leader_starts_with_zero_motion(
     np.testing.assert_allclose(drive.desired[0], before, rtol=0, atol=1e-9)
 
 
+def test_the_gizmo_moves_in_the_scene_whatever_the_operators_view(
+    robot: InstrumentRobot, rng: np.random.Generator
+) -> None:
+    drive = Drive(robot)
+    drive.input["settings"]["rotation_base_leader"] = random_rotation(rng).as_matrix()
+    drive.enable()
+    drive.lead(np.zeros(3), kind=LeaderKind.GIZMO)
+    drive.tick()
+    before, _ = drive.desired
+    drive.lead(np.array([0.0, 1e-5, 0.0]), kind=LeaderKind.GIZMO)
+    drive.tick()
+    np.testing.assert_allclose(drive.desired[0] - before, [0.0, 1e-5, 0.0], rtol=0, atol=1e-12)
+
+
 def test_matched_alignment_engages_only_a_leader_that_points_like_the_tip(
     robot: InstrumentRobot, rng: np.random.Generator
 ) -> None:
