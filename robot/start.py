@@ -15,6 +15,7 @@ from robot.segment import tip_rotation
 _SEEDS = 48
 _ITERATIONS = 60
 _POSTURE_STEPS = 200
+_POSTURE_STEP = 0.05
 _POSITION_TOLERANCE = 1e-12
 
 
@@ -95,13 +96,13 @@ def posture_cost(q: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> float:
 
 
 def _relax(arm: Arm, q: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Slide along the arm's self-motion toward the middle of the joint ranges."""
+    """Slide along the arm's self-motion to where it is nearest the middle of the joint ranges."""
     middle, reach = 0.5 * (lower + upper), upper - lower
     for _ in range(_POSTURE_STEPS):
         arm.update(q)
         null = np.linalg.svd(_flange_jacobian(arm))[2][6]
-        slope = float(null @ ((q - middle) / reach**2))
-        q = np.clip(q - 0.2 * slope * null, lower, upper)
+        step = float(null @ ((q - middle) / reach**2)) / float(null @ (null / reach**2))
+        q = np.clip(q - min(max(0.5 * step, -_POSTURE_STEP), _POSTURE_STEP) * null, lower, upper)
     return q
 
 

@@ -11,9 +11,11 @@ import numpy as np
 
 from robot.priority.levels import Plan
 
-_SOFT_WEIGHT = 1e-9
-"""Regularisation of a level's residual. At daqp's default of 1e-6 a level that cannot be met is off
-by 4e-4 of its residual; at 1e-12 the solver fails."""
+_SOFT_WEIGHTS = (1e-9, 1e-7, 1e-6)
+"""Regularisation of a level's residual, the next one where the solver went in circles. At daqp's
+default of 1e-6 a level that cannot be met is off by 4e-4 of its residual; at 1e-12 the solver
+fails. At 1e-9 one problem in ten thousand ends with a level that is not at its best."""
+_CYCLED = 3
 _PRIMAL_TOLERANCE = 1e-9
 
 _PER_POSITION_ERROR = 0.05
@@ -76,15 +78,18 @@ class LexicographicProblem:
         replay could not be compared bit for bit.
         """
         np.negative(preferred, out=self._linear)
-        rates, _, flag, _ = daqp.solve(
-            self._hessian,
-            self._linear,
-            self._matrix,
-            self._upper,
-            self._lower,
-            self._sense,
-            self._break_points,
-            rho_soft=_SOFT_WEIGHT + damping,
-            primal_tol=_PRIMAL_TOLERANCE,
-        )
+        for weight in _SOFT_WEIGHTS:
+            rates, _, flag, _ = daqp.solve(
+                self._hessian,
+                self._linear,
+                self._matrix,
+                self._upper,
+                self._lower,
+                self._sense,
+                self._break_points,
+                rho_soft=weight + damping,
+                primal_tol=_PRIMAL_TOLERANCE,
+            )
+            if flag != _CYCLED:
+                break
         return rates, flag

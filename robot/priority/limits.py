@@ -20,7 +20,7 @@ LAMBDA_LOW_BIT = 17
 LAMBDA_HIGH_BIT = 18
 
 BEND_MARGIN = 5e-5
-"""Kept from the bend limit, rad: a tick along the limit's circle leaves it by less than this."""
+"""Least distance kept from the bend limit, rad; see :func:`bend_margin`."""
 LAMBDA_MARGIN = 1e-4
 """Kept from both ends of lambda: the true shaft and the commanded lambda differ by up to this after
 a fast tick."""
@@ -37,6 +37,19 @@ def _interval(
     up = min(speed, gain * (upper - value) / dt)
     down = max(-speed, gain * (lower - value) / dt)
     return max(min(down, speed), -speed), min(max(up, -speed), speed)
+
+
+@compiled
+def bend_margin(parameters: np.ndarray, dt: float) -> float:
+    """Distance kept from the bend limit, rad.
+
+    A tick along the limit's circle goes straight and so leaves the circle: at the servos' fastest,
+    along the diagonal of their box, by this much. The next tick takes it back.
+    """
+    p = parameters[0]
+    step = math.sqrt(2.0) * p.pulley_radius / p.pitch_radius * p.servo_speed * dt
+    leaving = p.bend_max - math.sqrt(max(p.bend_max**2 - step**2, 0.25 * p.bend_max**2))
+    return float(max(BEND_MARGIN, leaving))
 
 
 @compiled
@@ -80,7 +93,11 @@ def rate_limits(
         bend_row[i] = 0.0
     bend_row[7] = x[7] / phi if phi > 1e-9 else 1.0
     bend_row[8] = x[8] / phi if phi > 1e-9 else 0.0
-    return float(gain * (p.bend_max - BEND_MARGIN - phi) / dt)
+    room = p.bend_max - bend_margin(parameters, dt) - phi
+    if room < 0.0:
+        # All of it is taken back, but no faster than the servos can.
+        return float(max(room / dt, -ratio * p.servo_speed))
+    return float(gain * room / dt)
 
 
 @compiled
@@ -187,7 +204,8 @@ def describe(bits: int, x: np.ndarray, parameters: np.ndarray) -> list[str]:
         if bits >> (JOINT_POSITION_BIT + i) & 1:
             middle = 0.5 * (p["joint_lower"][i] + p["joint_upper"][i])
             end = "upper" if x[i] > middle else "lower"
-            words.append(f"joint {i + 1} at its {end} limit ({math.degrees(x[i]):.1f} deg)")
+            limit = math.degrees(p[f"joint_{end}"][i])
+            words.append(f"joint {i + 1} at its {end} limit ({limit:.1f} deg)")
         if bits >> (JOINT_SPEED_BIT + i) & 1:
             words.append(f"joint {i + 1} at its speed limit")
     if bits >> BEND_BIT & 1:
