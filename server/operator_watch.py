@@ -14,7 +14,7 @@ from server.lease import Lease
 from server.link import WebLink
 from server.state_source import StateSource
 
-HEARTBEAT_S = 1.0
+HEARTBEAT_S = 2.0
 """Longest silence of an operator's page that sends heartbeats."""
 
 HOLD_S = 0.6
