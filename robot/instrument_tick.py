@@ -23,7 +23,7 @@ DONE, SOLVE_QP, SOLVE_CLOSED_FORM = -1, 0, 100
 """What :func:`decide_and_prepare` left to do: nothing, or to solve; the case is added to these."""
 
 NOT_FINITE = -100
-"""Solver status when the rates hold NaN or infinity."""
+"""Solver status when the problem or the rates hold NaN or infinity."""
 
 _ENABLED = int(Safety.ENABLED)
 _HQP, _AUGMENTED = int(Solver.HQP), int(Solver.AUGMENTED)
@@ -206,6 +206,17 @@ def _trocar_moves(tick_input: np.ndarray) -> bool:
 
 
 @compiled
+def _numbers(dt: float, targets: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> bool:
+    """Whether the problem is made of numbers. A solver may take a NaN for a bound that is not there
+    and answer with finite rates that ignore the trocar.
+    """
+    total = 1.0 / dt + dt
+    for k in range(10):
+        total += abs(targets[k]) + abs(lower[k]) + abs(upper[k])
+    return math.isfinite(total)
+
+
+@compiled
 def _levels_and_limits(
     outcome: np.ndarray,
     tick_input: np.ndarray,
@@ -291,6 +302,10 @@ def decide_and_prepare(
     rows = _levels_and_limits(
         outcome, tick_input, parameters, plans, catalogue, targets, matrix, upper, lower
     )
+    if not _numbers(i_.dt_s, targets, lower, upper):
+        outcome[0].report.solver_status = NOT_FINITE
+        apply_event(outcome, _SOLVER_FAILED)
+        return DONE
     if i_.settings.solver != _HQP:
         return SOLVE_CLOSED_FORM + int(i_.settings.case)
     rates = np.empty(10)
