@@ -24,6 +24,7 @@ from server.access import Access
 from server.api_paths import list_experiments
 from server.lifeline import end_with_supervisor
 from server.link import WebLink
+from server.realtime import prefer
 from server.run_directory import RunDirectory
 from server.scene_server import SceneServer
 from server.services import Services
@@ -124,6 +125,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The supervisor gets them too, and ends everything in order.
         signal.signal(ignored, signal.SIG_IGN)
     logging.basicConfig(format="keyhole web: %(levelname)s %(message)s", level=logging.WARNING)
+    prefer()
     end_with_supervisor(arguments.lifeline_fd)
     try:
         serve(RunDirectory(arguments.run_directory), socket.socket(fileno=arguments.listen_fd))

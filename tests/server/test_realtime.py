@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+
+from server import realtime
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -64,3 +67,46 @@ def test_without_the_right_it_says_what_to_do() -> None:
     assert not told["fifo"]
     assert told["words"].startswith("off: SCHED_FIFO is not permitted (rtprio limit 0")
     assert "/etc/security/limits.d" in told["words"]
+
+
+PREFERRED = """
+import json, os, sys, threading
+from pathlib import Path
+from server import realtime
+{before}
+permitted = realtime.prefer()
+niceness = []
+later = threading.Thread(target=lambda: niceness.append(os.getpriority(os.PRIO_PROCESS, 0)))
+later.start(); later.join()
+group = Path("/proc/self/autogroup")
+words = group.read_text() if group.exists() else ""
+print(json.dumps({{"permitted": permitted, "nice": niceness[0], "group": words}}))
+"""
+
+
+def prefer(before: str = "") -> Any:
+    result = subprocess.run(
+        [sys.executable, "-c", PREFERRED.format(before=before)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+        start_new_session=True,
+    )
+    return json.loads(result.stdout)
+
+
+def test_a_preferred_process_goes_first_where_that_is_permitted() -> None:
+    told = prefer()
+    if told["permitted"]:
+        assert told["nice"] == realtime.PREFERENCE
+        assert not told["group"] or told["group"].split()[-1] == str(realtime.PREFERENCE)
+    else:
+        assert told["nice"] == os.getpriority(os.PRIO_PROCESS, 0)
+
+
+def test_without_the_right_a_process_is_an_ordinary_one() -> None:
+    told = prefer(WITHOUT_RIGHTS + "resource.setrlimit(resource.RLIMIT_NICE, (0, 0))\n")
+    assert not told["permitted"]
+    assert told["nice"] == os.getpriority(os.PRIO_PROCESS, 0)
+    assert not told["group"] or told["group"].split()[-1] != str(realtime.PREFERENCE)
