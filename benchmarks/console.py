@@ -16,9 +16,9 @@ from typing import Any, Self
 
 from robot.errors import KeyholeError
 from robot.records import RECORD
-from server.child_process import module_command, module_environment
-from server.link_records import RECORD_RING_FILE
-from server.mapped import MappedRing
+from server.memory.link_records import RECORD_RING_FILE
+from server.memory.mapped import MappedRing
+from server.supervision.child_process import module_command, module_environment
 
 ROBOT = "/api/v1/robots/instrument"
 START_S = 120.0

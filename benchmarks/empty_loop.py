@@ -11,7 +11,7 @@ import json
 import sys
 import time
 
-from server import realtime
+from server.control import realtime
 
 
 def measure(period_ns: int, phase_ns: int, seconds: float) -> tuple[list[int], int]:

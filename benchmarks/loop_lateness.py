@@ -27,7 +27,7 @@ import numpy as np
 
 from benchmarks.console import Console, ConsoleFailed, Helper
 from robot.configuration import Configuration
-from server.run_directory import default_path
+from server.memory.run_directory import default_path
 
 ROUNDS = 3
 CLIENTS = 20

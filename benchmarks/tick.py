@@ -29,7 +29,7 @@ from robot.priority.lexicographic import LexicographicProblem
 from robot.records import OUTCOME, Request
 from robot.urdf import urdf_text
 from scenes.experiments import experiment
-from server.control_loop import ControlLoop
+from server.control.loop import ControlLoop
 
 _WARM_UP = 500
 

@@ -52,9 +52,9 @@ def execute(arguments: argparse.Namespace) -> int:
         KeyholeError: something stands against the start; nothing was started.
     """
     from server.configuration_file import load
-    from server.listener import address_of, is_loopback, listen
-    from server.run_directory import RunDirectory, default_path
-    from server.supervisor import Supervisor, say
+    from server.memory.run_directory import RunDirectory, default_path
+    from server.supervision.listener import address_of, is_loopback, listen
+    from server.supervision.supervisor import Supervisor, say
 
     if arguments.robot not in ROBOTS:
         raise UnknownName("robot", arguments.robot, ROBOTS)

@@ -18,7 +18,7 @@ from robot.records import Request, Safety
 from robot.safety import REASONS, Event
 from robot.segment import polar
 from scenes.path import Path
-from server.control_loop import COORDINATE_NAMES, SOLVER_NAMES, ControlLoop
+from server.control.loop import COORDINATE_NAMES, SOLVER_NAMES, ControlLoop
 
 TRACE_COLUMNS = (
     ["time_s"]
@@ -112,7 +112,8 @@ class HeadlessRun:
             np.zeros((self.steps, 3)),
             np.zeros(self.steps, dtype=np.int64),
         )
-        held_back: dict[int, int] = {}
+        held_back: dict[str, int] = {}
+        loop.hold = 1  # a run has nobody who could keep the hold-to-move key down
         loop.request = Request.ENABLE
         loop.step()
         loop.start_path(self._options.path)
@@ -132,8 +133,10 @@ class HeadlessRun:
             )
             result.tick_ns[done] = record["header"]["tick_ns"]
             result.violations += self._breaks_a_limit(truth, report["x_dot"])
-            bits = int(report["limits_active"])
-            held_back[bits] = held_back.get(bits, 0) + 1
+            for words in describe(
+                int(report["limits_active"]), report["x"], self._robot.parameters
+            ):
+                held_back[words] = held_back.get(words, 0) + 1
             done += 1
             if done % 500 == 0:
                 progress(done / self.steps)
@@ -142,7 +145,9 @@ class HeadlessRun:
                 break
         result.trace, result.errors = result.trace[:done], result.errors[:done]
         result.tick_ns = result.tick_ns[:done]
-        result.limits = self._limits_in_words(held_back, done)
+        result.limits = {
+            words: round(count / done, 4) for words, count in sorted(held_back.items())
+        }
         return result
 
     def _breaks_a_limit(self, truth: np.void, x_dot: np.ndarray) -> int:
@@ -150,14 +155,6 @@ class HeadlessRun:
         broken = violations(x, self._robot.parameters)
         broken += speed_violations(x_dot, self._robot.parameters)
         return int(broken > 0)
-
-    def _limits_in_words(self, held_back: dict[int, int], done: int) -> dict[str, float]:
-        shares: dict[str, float] = {}
-        x = self._loop.record["outcome"]["report"]["x"][0]
-        for bits, count in held_back.items():
-            for words in describe(bits, x, self._robot.parameters):
-                shares[words] = shares.get(words, 0.0) + count / done
-        return {words: round(share, 4) for words, share in sorted(shares.items())}
 
 
 def _summary(values: np.ndarray, factor: float) -> dict[str, float | None]:

@@ -7,6 +7,7 @@ import json
 import signal
 import sys
 from pathlib import Path
+from typing import Any
 
 from robot.configuration import Configuration
 from robot.errors import KeyholeError
@@ -14,7 +15,7 @@ from robot.priority.levels import CASE_NAMES
 from scenes.experiments import experiment, names
 from scenes.path_file import parse_csv
 from server.configuration_file import load
-from server.control_loop import COORDINATE_NAMES, SOLVER_NAMES
+from server.control.loop import COORDINATE_NAMES, SOLVER_NAMES
 from server.headless_run import (
     TRACE_COLUMNS,
     HeadlessRun,
@@ -62,10 +63,9 @@ def execute(arguments: argparse.Namespace) -> int:
     options = _options(arguments, configuration)
     _check_writable(arguments.json)
     _check_writable(arguments.trace)
-    run = HeadlessRun(configuration, options)
-    stopped = _StopSignals()
     progress = _bar if sys.stderr.isatty() else _no_bar
-    result = run.execute(progress, stopped.received)
+    with _StopSignals() as stopped:
+        result = HeadlessRun(configuration, options).execute(progress, stopped.received)
     if progress is _bar:
         print(file=sys.stderr)
     document = result_document(configuration, options, result, arguments.plant)
@@ -114,15 +114,24 @@ def _check_writable(name: str | None) -> None:
 
 
 class _StopSignals:
-    """Turns SIGINT and SIGTERM into a question the run can ask."""
+    """Turns the first SIGINT or SIGTERM into a question the run can ask; a second one ends it."""
 
     def __init__(self) -> None:
         self._received = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> _StopSignals:
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._receive)
+            self._before[number] = signal.signal(number, self._receive)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
 
     def _receive(self, *_: object) -> None:
         self._received = True
+        self.__exit__()
 
     def received(self) -> bool:
         return self._received

@@ -15,16 +15,16 @@ from starlette.routing import WebSocketRoute
 
 from robot.configuration import Configuration
 from robot.safety import REASONS, TRANSITIONS
-from server import refusals, stream
-from server.access import Access
-from server.api_robot import ROBOT
 from server.command_line import COMMANDS, _parser
 from server.configuration_file import load
-from server.link import WebLink
-from server.link_records import create_mapped_files
-from server.state_message import _REFUSED
-from server.state_schema import StateMessage
-from server.web_app import create_app
+from server.memory.link import WebLink
+from server.memory.link_records import create_mapped_files
+from server.web import refusals, stream
+from server.web.access import Access
+from server.web.api_robot import ROBOT
+from server.web.app import create_app
+from server.web.state_message import _REFUSED
+from server.web.state_schema import StateMessage
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])

@@ -11,7 +11,7 @@ import httpx
 from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
 
-from server.api_robot import ROBOT
+from server.web.api_robot import ROBOT
 from tests.server.console_process import ConsoleProcess, eventually
 
 JSON = dict[str, Any]

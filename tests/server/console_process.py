@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.console import Console
-from server.child_process import module_command
-from server.link import WebLink
-from server.link_records import SUPERVISION, SUPERVISION_FILE
-from server.mapped import MappedReadError, MappedSlot
+from server.memory.link import WebLink
+from server.memory.link_records import SUPERVISION, SUPERVISION_FILE
+from server.memory.mapped import MappedReadError, MappedSlot
+from server.supervision.child_process import module_command
 
 
 def command_line(*arguments: str) -> list[str]:

@@ -9,11 +9,11 @@ import httpx
 import pytest
 from websockets.exceptions import InvalidStatus
 
-from server.access import COOKIE, Access, names_of
-from server.access_guard import LARGEST_BODY
-from server.api_robot import ROBOT
-from server.page_headers import headers_for
-from server.refusals import ForeignHost, ForeignOrigin, NotAdmitted
+from server.web.access import COOKIE, Access, names_of
+from server.web.access_guard import LARGEST_BODY
+from server.web.api_robot import ROBOT
+from server.web.page_headers import headers_for
+from server.web.refusals import ForeignHost, ForeignOrigin, NotAdmitted
 from tests.server.api_client import ApiClient, problem_in
 from tests.server.console_process import ConsoleProcess
 

@@ -12,9 +12,9 @@ import pytest
 
 from robot.records import RECORD, Safety
 from robot.safety import TRANSITIONS
-from server.link_records import RECORD_RING_FILE
-from server.mapped import MappedRing
-from server.state_schema import StateMessage
+from server.memory.link_records import RECORD_RING_FILE
+from server.memory.mapped import MappedRing
+from server.web.state_schema import StateMessage
 from tests.server.api_client import JSON, ApiClient
 from tests.server.console_process import ConsoleProcess
 

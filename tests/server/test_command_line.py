@@ -10,8 +10,8 @@ import pytest
 
 from robot.errors import KeyholeError
 from server import command_line, console_command
-from server.child_process import module_command, module_environment
 from server.command_line import COMMANDS, main
+from server.supervision.child_process import module_command, module_environment
 from server.version import version
 
 

@@ -10,7 +10,7 @@ from robot.instrument_robot import InstrumentRobot
 from robot.records import LeaderKind, Request, Safety
 from scenes.path import Path
 from server.configuration_file import load
-from server.control_loop import ControlLoop
+from server.control.loop import ControlLoop
 
 
 @pytest.fixture(scope="module")

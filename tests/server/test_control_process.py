@@ -15,11 +15,11 @@ import pytest
 
 from benchmarks.console import START_S
 from robot.records import LeaderKind, Request, Safety
-from server.child_process import module_command, module_environment
 from server.configuration_file import load
-from server.link import WebLink
-from server.link_records import create_mapped_files
-from server.run_directory import RunDirectory
+from server.memory.link import WebLink
+from server.memory.link_records import create_mapped_files
+from server.memory.run_directory import RunDirectory
+from server.supervision.child_process import module_command, module_environment
 from tests.server.console_process import eventually
 
 PRESSES = 20
@@ -42,7 +42,7 @@ def running(tmp_path: Path) -> Iterator[Running]:
     reading, writing = os.pipe()
     arguments = ["--run-directory", str(directory.path), "--lifeline-fd", str(reading)]
     process = subprocess.Popen(
-        module_command("server.control_process", arguments),
+        module_command("server.control.process", arguments),
         pass_fds=[reading],
         env=module_environment(),
         stderr=subprocess.PIPE,

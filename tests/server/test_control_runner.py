@@ -15,13 +15,13 @@ from robot.instrument_robot import InstrumentRobot
 from robot.records import Safety
 from robot.safety import Event
 from server.configuration_file import load
-from server.control_link import ControlLink
-from server.control_loop import ControlLoop
-from server.control_process import Status, drive
-from server.control_runner import ControlRunner
-from server.lifeline import Lifeline
-from server.link import WebLink
-from server.link_records import create_mapped_files
+from server.control.lifeline import Lifeline
+from server.control.loop import ControlLoop
+from server.control.process import Status, drive
+from server.control.runner import ControlRunner
+from server.memory.control_link import ControlLink
+from server.memory.link import WebLink
+from server.memory.link_records import create_mapped_files
 
 RATE_HZ = 200.0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robot.records import LeaderKind
-from server.leader_choice import NOBODY, LeaderChoice
+from server.control.leader_choice import NOBODY, LeaderChoice
 
 GIZMO, POSE, TARGET = 0, 1, 2
 

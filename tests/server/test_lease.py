@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from server.access import Caller
-from server.lease import Lease
-from server.refusals import LeaseHeld, NotTheOperator
+from server.web.access import Caller
+from server.web.lease import Lease
+from server.web.refusals import LeaseHeld, NotTheOperator
 
 SECONDS = 5.0
 PAGE, OTHER_PAGE = Caller("page", None), Caller("other", None)

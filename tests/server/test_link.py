@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from robot.errors import InvalidPose
 from robot.records import RECORD, SETTINGS, LeaderKind, Request
 from scenes.path import Path as ScenePath
-from server.control_link import HOLD_TIMEOUT_NS, WEB_TIMEOUT_NS, ControlLink
-from server.link import WebLink
-from server.link_records import (
+from server.control.mapped_path import MappedPath
+from server.memory.control_link import HOLD_TIMEOUT_NS, WEB_TIMEOUT_NS, ControlLink
+from server.memory.link import WebLink
+from server.memory.link_records import (
     REQUEST_CAPACITY,
     STATUS,
     SUPERVISION,
@@ -24,8 +25,7 @@ from server.link_records import (
     Phase,
     create_mapped_files,
 )
-from server.mapped import MappedReadError, MappedSlot
-from server.mapped_path import MappedPath
+from server.memory.mapped import MappedReadError, MappedSlot
 
 SECOND_NS = 1_000_000_000
 

@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from server.listener import PortUnavailable, address_of, is_loopback, listen
+from server.supervision.listener import PortUnavailable, address_of, is_loopback, listen
 
 
 def test_port_0_takes_a_free_one() -> None:

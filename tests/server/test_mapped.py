@@ -15,7 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from robot.records import RECORD
-from server.mapped import MappedFileError, MappedReadError, MappedRing, MappedSlot
+from server.memory.mapped import MappedFileError, MappedReadError, MappedRing, MappedSlot
 
 ROOT = Path(__file__).resolve().parents[2]
 WIDE = np.dtype([("values", "i8", 512)])
@@ -24,7 +24,7 @@ WIDE = np.dtype([("values", "i8", 512)])
 WRITER = """
 import sys, numpy as np
 from tests.server.test_mapped import WIDE
-from server.mapped import MappedRing, MappedSlot
+from server.memory.mapped import MappedRing, MappedSlot
 kind, path = sys.argv[1:]
 file = (MappedSlot if kind == "slot" else MappedRing)(path, WIDE, writable=True)
 write = file.write if kind == "slot" else file.push
@@ -38,7 +38,7 @@ while True:
 READER = """
 import sys
 from tests.server.test_mapped import WIDE
-from server.mapped import MappedSlot
+from server.memory.mapped import MappedSlot
 slot = MappedSlot(sys.argv[1], WIDE)
 print("ready", flush=True)
 while True:

@@ -9,13 +9,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from server import realtime
+from server.control import realtime
 
 ROOT = Path(__file__).resolve().parents[2]
 
 REPORT = """
 import gc, json, os, sys, threading
-from server import realtime
+from server.control import realtime
 {before}
 words = realtime.enter({wanted!r})
 policies = []
@@ -72,7 +72,7 @@ def test_without_the_right_it_says_what_to_do() -> None:
 PREFERRED = """
 import json, os, sys, threading
 from pathlib import Path
-from server import realtime
+from server.control import realtime
 {before}
 permitted = realtime.prefer()
 niceness = []

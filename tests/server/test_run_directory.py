@@ -8,7 +8,12 @@ from pathlib import Path
 import pytest
 
 from server.configuration_file import load
-from server.run_directory import AlreadyRunning, RunDirectory, RunDirectoryError, default_path
+from server.memory.run_directory import (
+    AlreadyRunning,
+    RunDirectory,
+    RunDirectoryError,
+    default_path,
+)
 
 
 def test_it_is_private_and_so_is_what_is_in_it(tmp_path: Path) -> None:

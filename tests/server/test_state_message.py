@@ -23,9 +23,9 @@ from robot.records import (
 )
 from robot.safety import REASONS, Event
 from server.configuration_file import load
-from server.state_message import OperatorView, StateMessages, Surroundings
-from server.state_schema import StateMessage
-from server.state_source import LoopMeter
+from server.web.state_message import OperatorView, StateMessages, Surroundings
+from server.web.state_schema import StateMessage
+from server.web.state_source import LoopMeter
 
 NOW = 5_000_000_000
 RUNNING = Surroundings(NOW, "running", plant="kinematic", realtime="SCHED_FIFO")

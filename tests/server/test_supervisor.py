@@ -15,7 +15,7 @@ from urllib.error import HTTPError
 
 import pytest
 
-from server.child_process import module_environment
+from server.supervision.child_process import module_environment
 from tests.server.console_process import (
     ConsoleProcess,
     command_line,

@@ -21,7 +21,7 @@ from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 from websockets.typing import Subprotocol
 
-from server.viser_messages import LARGEST_MESSAGE, ViserFilter
+from server.web.viser_messages import LARGEST_MESSAGE, ViserFilter
 from tests.server.api_client import JSON, ApiClient
 from tests.server.console_process import ConsoleProcess, eventually
 

@@ -9,7 +9,7 @@ import viser
 
 from robot.configuration import Configuration
 from server import configuration_file
-from server.scene_view import SceneView
+from server.scene.view import SceneView
 from tests.server.scene.stage import Recorder, until
 from tests.server.scene.viser_browser import ViserBrowser
 

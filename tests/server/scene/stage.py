@@ -18,7 +18,7 @@ from robot.forward import ForwardKinematics
 from robot.instrument_robot import InstrumentRobot
 from robot.records import RECORD, LeaderKind, Safety
 from robot.urdf import urdf_text
-from server.mapped import MappedReadError
+from server.memory.mapped import MappedReadError
 
 
 class Sample(NamedTuple):

@@ -9,8 +9,8 @@ import pytest
 import viser
 
 from robot.records import Safety
-from server.scene_gizmo import FOLLOW_PERIOD
-from server.scene_view import PERIOD, SceneView
+from server.scene.gizmo import FOLLOW_PERIOD
+from server.scene.view import PERIOD, SceneView
 from tests.server.scene.stage import Recorder, messages, until
 from tests.server.scene.viser_browser import ViserBrowser
 

@@ -7,8 +7,8 @@ import pytest
 import trimesh
 import viser.transforms as tf
 
-from server.scene_shapes import Mesh, quaternions_from_z, revolve, ring, round_bar
-from server.scene_trocar import _port
+from server.scene.shapes import Mesh, quaternions_from_z, revolve, ring, round_bar
+from server.scene.trocar import _port
 
 
 @pytest.mark.parametrize(

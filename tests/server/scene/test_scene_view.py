@@ -11,9 +11,9 @@ from robot.configuration import Configuration
 from robot.records import RECORD
 from robot.rotations import matrix_from_quaternion
 from robot.segment import shape_frames
-from server.scene_camera import FIELD_OF_VIEW, INSTRUMENT, named_view
-from server.scene_trails import MOST_POINTS, SAMPLE_PERIOD, SECONDS
-from server.scene_view import PERIOD, SceneView
+from server.scene.camera import FIELD_OF_VIEW, INSTRUMENT, named_view
+from server.scene.trails import MOST_POINTS, SAMPLE_PERIOD, SECONDS
+from server.scene.view import PERIOD, SceneView
 from tests.server.scene.stage import Recorder, handle, messages, pose, somewhere, until
 from tests.server.scene.viser_browser import ViserBrowser
 

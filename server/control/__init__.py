@@ -1,0 +1,1 @@
+"""The control process: the only loop, its deadlines, and who leads."""

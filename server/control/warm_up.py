@@ -1,0 +1,72 @@
+"""Run every branch of the tick once before real time begins, so that nothing compiles later."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from hardware.kinematic_plant import KinematicPlant
+from robot.configuration import Configuration
+from robot.instrument_robot import InstrumentRobot
+from robot.records import Case, Coordinates, LeaderKind, Request, Solver
+from scenes.path import Path
+from server.control.loop import ControlLoop
+
+_TICKS_EACH = 3
+_STEP_M = 2e-5
+
+
+def warm_up(robot: InstrumentRobot, configuration: Configuration) -> None:
+    """Drive a throw-away plant and loop through every solver, leader and safety state.
+
+    Args:
+        robot: the robot whose functions are compiled; it is left as it was.
+        configuration: what it was built from.
+    """
+    plant = KinematicPlant(configuration, robot.initial_state()["x"][0])
+    loop = ControlLoop(robot, plant, configuration)
+    _request(loop, Request.ENABLE)
+    loop.leader["timeout_s"] = 1.0
+    loop.leader["wxyz"][0] = (1.0, 0.0, 0.0, 0.0)
+    loop.leader["smoothing_s"] = 0.05
+    for kind in (LeaderKind.GIZMO, LeaderKind.API_TARGET):
+        loop.leader["kind"], loop.leader["clutch"] = kind, 1
+        loop.leader["absolute"] = int(kind == LeaderKind.API_TARGET)
+        if kind == LeaderKind.API_TARGET:
+            loop.leader["position"] = loop.record["outcome"]["report"]["commanded_position"]
+            loop.leader["wxyz"] = loop.record["outcome"]["report"]["commanded_wxyz"]
+        _every_setting(loop)
+        loop.leader["clutch"] = 0
+        loop.step()
+    _play(loop)
+    _request(loop, Request.PAUSE)
+    _request(loop, Request.EMERGENCY_STOP)
+    _request(loop, Request.RESET)
+    plant.close()
+
+
+def _request(loop: ControlLoop, request: Request) -> None:
+    loop.request = request
+    loop.step()
+
+
+def _every_setting(loop: ControlLoop) -> None:
+    for case, solver, coordinates in itertools.product(Case, Solver, Coordinates):
+        loop.settings["case"], loop.settings["solver"] = case, solver
+        loop.settings["coordinates"] = coordinates
+        for _ in range(_TICKS_EACH):
+            loop.leader["sequence"] += 1
+            loop.leader["position"][0, 0] += _STEP_M
+            loop.step()
+
+
+def _play(loop: ControlLoop) -> None:
+    samples = np.zeros((3, 8))
+    samples[:, 0] = (0.0, 0.1, 0.2)
+    samples[:, 1] = (0.0, 0.001, 0.0)
+    samples[:, 4] = 1.0
+    loop.start_path(Path(samples, "warm-up"))
+    for _ in range(_TICKS_EACH):
+        loop.step()
+    loop.stop_path()

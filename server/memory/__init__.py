@@ -1,0 +1,1 @@
+"""What processes share: mapped files, and the link between web and control over them."""

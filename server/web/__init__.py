@@ -1,0 +1,1 @@
+"""The web process: the API, the page, access, the stream, and the way to viser."""

@@ -1,0 +1,63 @@
+"""Experiments and paths: list, play, stop."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+from fastapi import APIRouter
+from starlette.responses import Response
+
+from robot.configuration import Configuration
+from server.web.api_models import ExperimentEntry, PathStart
+from server.web.api_robot import ROBOT, STATE
+from server.web.services import Operator, ServicesHere
+
+if TYPE_CHECKING:
+    from scenes.path import Path
+
+router = APIRouter(prefix=ROBOT, tags=["paths"])
+
+
+def list_experiments(configuration: Configuration) -> list[ExperimentEntry]:
+    """Every experiment, with its length."""
+    from scenes import experiments
+
+    found = [experiments.experiment(name, configuration) for name in experiments.names()]
+    return [
+        ExperimentEntry(name=one.name, title=one.title, duration_s=one.duration_s) for one in found
+    ]
+
+
+def _path(body: PathStart, configuration: Configuration) -> Path:
+    if body.csv is not None:
+        from scenes.path_file import parse_csv
+
+        return parse_csv(body.csv, body.name)
+    from scenes import experiments
+
+    assert body.experiment is not None
+    return experiments.experiment(body.experiment, configuration).path
+
+
+@router.get("/experiments", summary="The experiments that can be played")
+async def experiments(services: ServicesHere) -> list[ExperimentEntry]:
+    """Each is a path of the tip relative to where it starts."""
+    return await asyncio.to_thread(list_experiments, services.configuration)
+
+
+@router.post("/path", summary="Play a path from where the tip is", responses=STATE)
+async def start_path(body: PathStart, services: ServicesHere, caller: Operator) -> Response:
+    """While it plays, no other leader is followed. 409 unless the robot is enabled and free."""
+    path = await asyncio.to_thread(_path, body, services.configuration)
+    services.lease.check(caller)
+    services.target.clear()
+    await services.requests.start_path(path.samples, path.name)
+    return services.state(caller)
+
+
+@router.delete("/path", summary="Stop the path", responses=STATE)
+async def stop_path(services: ServicesHere, caller: Operator) -> Response:
+    """The tip stays where it is; harmless when no path plays."""
+    await services.requests.stop_path()
+    return services.state(caller)

@@ -1,0 +1,66 @@
+"""The web application: the API, the stream, the page, and viser, behind one door."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable
+
+from fastapi import FastAPI
+
+from robot.configuration import Configuration
+from server.memory.link import WebLink
+from server.version import version
+from server.web import api_lease, api_motion, api_paths, api_robot, api_safety, problems, stream
+from server.web.access import Access
+from server.web.access_guard import AccessGuard
+from server.web.page_files import add_page, describe
+from server.web.services import make_services
+from server.web.viser_proxy import ViserAddress, viser_router
+
+
+def create_app(
+    configuration: Configuration,
+    link: WebLink,
+    access: Access,
+    viser_address: Callable[[], ViserAddress | None] = lambda: None,
+    scene: Callable[[], str] = lambda: "loading",
+) -> FastAPI:
+    """Make the application of one console.
+
+    Args:
+        configuration: of the robot.
+        link: to the control process.
+        access: who may speak.
+        viser_address: where viser listens; None while it is not there yet.
+        scene: ``loading``, ``ready``, or why there is no scene.
+    """
+    services = make_services(configuration, link, scene)
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        watching = asyncio.create_task(services.watch.run())
+        try:
+            yield
+        finally:
+            watching.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await watching
+            services.watch.operator_lost("the web process ends")
+
+    app = FastAPI(
+        title="Keyhole",
+        version=version(),
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+    )
+    app.state.services = services
+    app.add_middleware(AccessGuard, access=access)
+    problems.install(app)
+    for part in (api_robot, api_lease, api_safety, api_motion, api_paths, stream):
+        app.include_router(part.router)
+    app.include_router(viser_router(viser_address))
+    add_page(app)
+    describe(app)
+    return app

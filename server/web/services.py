@@ -1,0 +1,100 @@
+"""What the parts of the web process share, made once per process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+from starlette.responses import Response
+
+from robot.configuration import Configuration
+from server.memory.link import WebLink
+from server.web.access import Caller
+from server.web.access_guard import caller_of
+from server.web.api_leaders import PoseLeader, TargetLeader
+from server.web.control_requests import ControlRequests
+from server.web.dexterity_source import DexteritySource
+from server.web.lease import Lease
+from server.web.operator_watch import OperatorWatch
+from server.web.state_source import StateSource
+
+
+@dataclass(frozen=True)
+class Services:
+    """Everything that the API, the stream and the proxy need.
+
+    Attributes:
+        configuration: of the robot.
+        link: to the control process.
+        lease: who drives.
+        source: the newest state.
+        requests: to the control process.
+        target: the API's standing target.
+        pose: the API's clutched leader.
+        watch: over the operator.
+        dexterity: where the tip is.
+        scene: ``loading``, ``ready``, or why there is no scene.
+    """
+
+    configuration: Configuration
+    link: WebLink
+    lease: Lease
+    source: StateSource
+    requests: ControlRequests
+    target: TargetLeader
+    pose: PoseLeader
+    watch: OperatorWatch
+    dexterity: DexteritySource
+    scene: Callable[[], str]
+
+    def state(self, caller: Caller) -> Response:
+        """The state message as ``caller`` sees it, as a response."""
+        return Response(self.source.text(caller), media_type="application/json")
+
+
+def make_services(
+    configuration: Configuration, link: WebLink, scene: Callable[[], str]
+) -> Services:
+    """Put the services together."""
+    lease = Lease(configuration.server.lease_seconds)
+    source = StateSource(link, configuration, lease)
+    target = TargetLeader(link, source, configuration)
+    pose = PoseLeader(link, source, configuration)
+    return Services(
+        configuration,
+        link,
+        lease,
+        source,
+        ControlRequests(link, source),
+        target,
+        pose,
+        OperatorWatch(link, source, lease, target, pose),
+        DexteritySource(configuration),
+        scene,
+    )
+
+
+def services_of(connection: HTTPConnection) -> Services:
+    """The services of the application that a request came to."""
+    services = connection.app.state.services
+    assert isinstance(services, Services)
+    return services
+
+
+def _caller(connection: HTTPConnection) -> Caller:
+    return caller_of(connection.scope)
+
+
+def _operator(connection: HTTPConnection) -> Caller:
+    caller = caller_of(connection.scope)
+    services_of(connection).lease.check(caller)
+    return caller
+
+
+ServicesHere = Annotated[Services, Depends(services_of)]
+AnyCaller = Annotated[Caller, Depends(_caller)]
+Operator = Annotated[Caller, Depends(_operator)]
+"""A caller who holds the lease; anybody else gets 403."""

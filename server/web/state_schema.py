@@ -1,0 +1,143 @@
+"""The state message as a schema, for the API's documentation and for the tests.
+
+Messages are made by :mod:`server.web.state_message` and never pass through these models.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Millimetres = list[float | None]
+
+
+class Part(BaseModel):
+    """A part of the message; numbers are null where they are not known."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class SafetyPart(Part):
+    """The safety state, why, and what to do."""
+
+    state: Literal["DISABLED", "ENABLED", "PAUSED", "FAULT"]
+    reason: str
+    reason_code: str
+    action: str
+
+
+class OperatorPart(Part):
+    """Who drives."""
+
+    name: str | None
+    you: bool
+    expires_in_s: float | None
+
+
+class PriorityPart(Part):
+    """What matters most."""
+
+    case: Literal["0", "1", "2", "pointing"]
+    solver: Literal["hqp", "closed-form", "augmented"]
+    coordinates: Literal["uv", "polar"]
+
+
+class TeleoperationPart(Part):
+    """How the leader's motion becomes tip motion."""
+
+    motion_scale: float | None
+    motion_scale_min: float | None
+    motion_scale_max: float | None
+    lock_rotation: bool
+    lock_translation: bool
+    alignment: Literal["relative", "matched"]
+    hold_to_move: bool
+
+
+class ErrorsPart(Part):
+    """Desired minus true (a simulation) or minus measured; RCM: trocar to shaft axis."""
+
+    position_mm: float | None
+    orientation_deg: float | None
+    rcm_mm: float | None
+    source: Literal["true", "measured"]
+
+
+class LambdaPart(Part):
+    """Where the trocar touches the shaft: 0 at its base, 1 at its end."""
+
+    value: float | None
+    reference: float | None
+    min: float | None
+    max: float | None
+
+
+class PosePart(Part):
+    """A pose in the base frame."""
+
+    position_mm: Millimetres = Field(min_length=3, max_length=3)
+    orientation_wxyz: list[float | None] = Field(min_length=4, max_length=4)
+
+
+class ResidualsPart(Part):
+    """What each level of priority could not do."""
+
+    rcm_mm_s: float | None
+    linear_mm_s: float | None
+    angular_deg_s: float | None
+
+
+class LoopPart(Part):
+    """Health of the control loop."""
+
+    rate_hz: float | None
+    overruns: int | None
+    lateness_us: float | None
+    tick_us: float | None
+    realtime: str
+    real_time_factor: float | None
+
+
+class PathPart(Part):
+    """The path that plays."""
+
+    name: str | None
+    progress: float | None = Field(description="0 to 1.")
+
+
+class StateMessage(Part):
+    """Everything about the robot at one tick. Positions and poses in the base frame."""
+
+    type: Literal["state"]
+    schema_version: Literal[1]
+    robot: Literal["instrument"]
+    tick: int | None
+    time_s: float | None = Field(description="The plant's clock, s.")
+    age_ms: float | None = Field(description="Since the record was published, ms.")
+    safety: SafetyPart
+    operator: OperatorPart
+    engaged: bool
+    leader: Literal["none", "gizmo", "api_pose", "api_target", "path"]
+    hold: bool
+    priority: PriorityPart
+    teleoperation: TeleoperationPart
+    errors: ErrorsPart
+    lambda_: LambdaPart = Field(alias="lambda")
+    bend_deg: float | None
+    bend_limit_deg: float | None
+    direction_deg: float | None
+    joints_deg: list[float | None] = Field(min_length=7, max_length=7)
+    joint_limits_deg: list[list[float | None]] = Field(min_length=7, max_length=7)
+    servos_deg: list[float | None] = Field(min_length=4, max_length=4)
+    desired: PosePart
+    commanded: PosePart
+    true: PosePart
+    trocar_mm: Millimetres = Field(min_length=3, max_length=3)
+    residuals: ResidualsPart
+    limits: list[str] = Field(description="Limits that hold the motion back, in words.")
+    loop: LoopPart
+    path: PathPart | None
+    plant: str
+    recording: bool
+    control: Literal["running", "starting", "down"]
