@@ -124,6 +124,18 @@ def test_an_old_sample_within_its_time_drives_on(drive: Drive) -> None:
     assert drive.tick()["command"]["moving"] == 1
 
 
+def test_a_leader_that_let_go_may_be_silent(drive: Drive) -> None:
+    drive.engage(np.zeros(3))
+    drive.lead(np.array([2e-3, 0.0, 0.0]))
+    drive.tick()
+    drive.let_go()
+    drive.input["leader"]["age_s"] = 1e9
+    x = drive.x
+    assert stood_still(drive.tick(), x)
+    assert drive.safety == Safety.ENABLED
+    assert drive.state["engaged"][0] == 0
+
+
 def test_a_leader_that_was_silent_before_engaging_does_not_engage(drive: Drive) -> None:
     drive.enable()
     drive.lead(np.zeros(3))
