@@ -70,7 +70,7 @@ class ConsolePage:
         self.page = context.new_page()
         self.page.goto(f"{console.base}/?token={console.token}")
         # The token leaves the address bar, and whatever else stood there with it.
-        self.page.goto(f"{console.base}/?fixedDpr=0.5")
+        self.page.goto(f"{console.base}/?fixedDpr=0.25")
         eventually(lambda: self.page.evaluate(_STATE), "the page shows a state", SLOW_S)
 
     def button(self, name: str) -> Locator:
@@ -168,7 +168,7 @@ class ConsolePage:
         self.point_at(axis)
         self.page.mouse.move(*start)
         self.page.mouse.down()
-        self.page.mouse.move(*end, steps=8)
+        self.page.mouse.move(*end, steps=4)
         try:
             yield
         finally:

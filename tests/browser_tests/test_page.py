@@ -17,6 +17,15 @@ SLIP_IN = """() => {
   script.textContent = "window.slippedIn = 'a script'";
   document.body.append(script);
 }"""
+BREAKAGES = {
+    "overlap": (".brand p", "margin-left: 260px"),
+    "too small": ("#freeze", "width: 6px; padding: 0; border: 0; overflow: hidden"),
+    "cut": (".plots-bar", "transform: translateX(60px)"),
+    "contrast": ("h1", "color: #e0e0e0"),
+    "covered": ("#pause", "transform: translateX(-60px)"),
+    "not whole on the screen": ("#help", "margin-right: -30px"),
+    "wider than its button": ("#enable", "width: 30px"),
+}
 SIZES = [(1280, 800), (1920, 1080)]
 
 
@@ -69,6 +78,7 @@ def test_nothing_overlaps_is_cut_or_pale(
         assert isinstance(found, list)
         return found
 
+    eventually(lambda: not page.locator(".toast").count(), "no message covers the scene", SLOW_S)
     try:
         page.set_viewport_size({"width": size[0], "height": size[1]})
         page.emulate_media(color_scheme=theme)  # type: ignore[arg-type]
@@ -78,6 +88,22 @@ def test_nothing_overlaps_is_cut_or_pale(
     finally:
         page.emulate_media(color_scheme="light")
         page.set_viewport_size(before)
+
+
+def test_a_broken_layout_would_be_noticed(
+    fresh_context: BrowserContext, console: ConsoleProcess
+) -> None:
+    page = fresh_context.new_page()
+    page.set_viewport_size({"width": 1280, "height": 800})
+    page.goto(f"{console.base}/?token={console.token}")
+    expect(page.locator("#operator-role")).to_have_text("Watching")
+    set_style = "([where, style]) => { document.querySelector(where).style.cssText = style; }"
+    eventually(lambda: page.evaluate(LAYOUT_FAULTS) == [], "a sound layout", SLOW_S)
+    for fault, (where, style) in BREAKAGES.items():
+        page.evaluate(set_style, [where, style])
+        found = page.evaluate(LAYOUT_FAULTS)
+        assert [words for words in found if words.startswith(fault)], (fault, found)
+        page.evaluate(set_style, [where, ""])
 
 
 def test_the_documentation_of_the_api_needs_no_other_host(
