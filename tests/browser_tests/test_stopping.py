@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from playwright.sync_api import expect
 
 from tests.browser_tests.conftest import Seat
@@ -15,6 +16,7 @@ from tests.browser_tests.test_driving import follow, tip_of
 from tests.server.console_process import ConsoleProcess, eventually
 
 PAUSED_WITHIN_S = 2.0
+PULLS = 5
 
 
 def stands(console: ConsoleProcess) -> JSON:
@@ -69,6 +71,19 @@ def test_the_emergency_stop_ends_all_motion(
     expect(operator.page.locator("#banner")).to_be_hidden()
 
 
+def moved_mm(console: ConsoleProcess, start: NDArray[np.float64]) -> float:
+    return float(np.linalg.norm(np.subtract(tip_of(console.state()), start)))
+
+
+def comes_true(condition: Callable[[], bool], within_s: float) -> bool:
+    ends = time.monotonic() + within_s
+    while time.monotonic() < ends:
+        if condition():
+            return True
+        time.sleep(0.02)
+    return False
+
+
 def test_hold_to_move_follows_the_key_while_the_scene_has_the_focus(
     operator: ConsolePage, console: ConsoleProcess
 ) -> None:
@@ -88,16 +103,21 @@ def test_hold_to_move_follows_the_key_while_the_scene_has_the_focus(
     eventually(lambda: not console.state()["engaged"], "the gizmo is let go", SLOW_S)
 
     operator.page.keyboard.down("Space")
-    eventually(hold, "the key is held", SLOW_S)
-    with operator.pulling(0, 6.0):
-        eventually(
-            lambda: np.linalg.norm(tip_of(console.state()) - start) > 3.0, "the tip moves", SLOW_S
-        )
-        operator.page.keyboard.up("Space")
-        eventually(lambda: not hold(), "the key is up", SLOW_S)
-        held = tip_of(stands(console))
-        operator.page.mouse.move(*operator.pixel(0, 0.05))
-        assert tip_of(stands(console)) == pytest.approx(held, abs=0.01)
+    # A browser that draws in software may stall for longer than a held key counts. The clutch then
+    # closes anew where the mouse is, as it must, and one pulls once more.
+    for _ in range(PULLS):
+        eventually(hold, "the key is held", SLOW_S)
+        with operator.pulling(0, 6.0):
+            if not comes_true(lambda: moved_mm(console, start) > 3.0, SLOW_S / PULLS):
+                continue
+            operator.page.keyboard.up("Space")
+            eventually(lambda: not hold(), "the key is up", SLOW_S)
+            held = tip_of(stands(console))
+            operator.page.mouse.move(*operator.pixel(0, 0.05))
+            assert tip_of(stands(console)) == pytest.approx(held, abs=0.01)
+            break
+    else:
+        pytest.fail(f"the tip did not move in {PULLS} pulls with the key held")
     assert console.state()["safety"]["state"] == "ENABLED"
 
 
