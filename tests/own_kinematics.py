@@ -35,14 +35,23 @@ class Pose(NamedTuple):
     shaft_end: np.ndarray
 
 
+def _about(axis: int, angle: float) -> np.ndarray:
+    """(3, 3) rotation about a coordinate axis."""
+    c, s = math.cos(angle), math.sin(angle)
+    following, last = (axis + 1) % 3, (axis + 2) % 3
+    matrix = np.eye(3)
+    matrix[following, following] = matrix[last, last] = c
+    matrix[following, last], matrix[last, following] = -s, s
+    return matrix
+
+
 def flange(q: np.ndarray) -> np.ndarray:
     """(4, 4) transform of frame 7 at joint angles ``q`` (7,)."""
     total = np.eye(4)
     for (quarters, a, d), angle in zip(TABLE_2, q, strict=True):
-        turn = Rotation.from_euler("x", 0.5 * math.pi * quarters)
-        step = np.eye(4)
-        step[:3, :3] = (turn * Rotation.from_euler("z", angle)).as_matrix()
-        step[:3, 3] = [a, *turn.apply([0.0, 0.0, d])[1:]]
+        turn, step = _about(0, 0.5 * math.pi * quarters), np.eye(4)
+        step[:3, :3] = turn @ _about(2, angle)
+        step[:3, 3] = turn @ [a, 0.0, d]
         total = total @ step
     return total
 
@@ -50,7 +59,7 @@ def flange(q: np.ndarray) -> np.ndarray:
 def segment(theta: float, delta: float, length: float) -> tuple[np.ndarray, np.ndarray]:
     """Tip (3,) and rotation (3, 3) of the continuum segment in its base frame."""
     phi = 0.5 * math.pi - theta
-    rotation = Rotation.from_euler("ZYZ", [-delta, phi, delta]).as_matrix()
+    rotation = _about(2, -delta) @ _about(1, phi) @ _about(2, delta)
     if phi == 0.0:
         return np.array([0.0, 0.0, length]), rotation
     lean = length * (1.0 - math.cos(phi)) / phi
