@@ -199,9 +199,12 @@ class ControlLink:
         self._leader_clutch[0] = 0
 
     def publish(self, record: NDArray[Any]) -> None:
-        """Publish a (1,) RECORD as the newest and into the ring."""
-        self._record.write(record)
+        """Publish a (1,) RECORD into the ring and as the newest.
+
+        In this order: a reader that has seen the newest finds it in the ring.
+        """
         self._ring.push(record)
+        self._record.write(record)
 
     def write_status(self, status: NDArray[Any]) -> None:
         """Publish the (1,) STATUS; for what changes rarely."""

@@ -298,6 +298,21 @@ def test_records_go_to_the_slot_and_the_ring(web: WebLink, control: ControlLink)
     assert ring.read_since(0)[0]["header"]["tick"].tolist() == [0, 1, 2]
 
 
+def test_what_is_seen_as_the_newest_stands_in_the_ring(
+    web: WebLink, control: ControlLink, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write, seen = MappedSlot.write, []
+
+    def note(slot: MappedSlot, record: NDArray[Any]) -> None:
+        seen.append(int(web.ring().sequence))
+        write(slot, record)
+
+    monkeypatch.setattr(MappedSlot, "write", note)
+    before = web.ring().sequence
+    control.publish(np.zeros(1, RECORD))
+    assert seen == [before + 1]
+
+
 def test_the_status_tells_starting_running_and_down(
     web: WebLink, control: ControlLink, directory: Path
 ) -> None:
