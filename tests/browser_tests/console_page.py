@@ -118,6 +118,8 @@ class ConsolePage:
         assert self.call("DELETE", "/path") == 200
         assert self.call("PUT", "/priority", priority) == 200
         assert self.call("PUT", "/teleoperation", as_configured) == 200
+        holds = self.page.get_by_role("switch", name="Hold-to-move")
+        eventually(lambda: not holds.is_checked(), "the settings are shown", SLOW_S)
         if self.console.state()["safety"]["state"] == "FAULT":
             assert self.call("POST", "/reset") == 200
             self.until("DISABLED")

@@ -101,14 +101,19 @@ def test_hold_to_move_follows_the_key_while_the_scene_has_the_focus(
         stands(console)
         assert tip_of(console.state()) == pytest.approx(start, abs=0.01)
     eventually(lambda: not console.state()["engaged"], "the gizmo is let go", SLOW_S)
+    eventually(
+        lambda: np.allclose(operator.gizmo_mm(), start, atol=0.2), "the gizmo is put back", SLOW_S
+    )
 
     operator.page.keyboard.down("Space")
     # A browser that draws in software may stall for longer than a held key counts. The clutch then
     # closes anew where the mouse is, as it must, and one pulls once more.
+    seen: list[JSON] = []
     for _ in range(PULLS):
         eventually(hold, "the key is held", SLOW_S)
         with operator.pulling(0, 6.0):
             if not comes_true(lambda: moved_mm(console, start) > 3.0, SLOW_S / PULLS):
+                seen.append(console.state())
                 continue
             operator.page.keyboard.up("Space")
             eventually(lambda: not hold(), "the key is up", SLOW_S)
@@ -117,7 +122,8 @@ def test_hold_to_move_follows_the_key_while_the_scene_has_the_focus(
             assert tip_of(stands(console)) == pytest.approx(held, abs=0.01)
             break
     else:
-        pytest.fail(f"the tip did not move in {PULLS} pulls with the key held")
+        words = [(one["safety"]["reason"], one["hold"], one["engaged"]) for one in seen]
+        pytest.fail(f"the tip did not move with the key held: {words}")
     assert console.state()["safety"]["state"] == "ENABLED"
 
 
