@@ -8,7 +8,7 @@ from hardware.plant import Actuator, Measurement, PlantSpec
 from robot.configuration import Configuration
 from robot.forward import ForwardKinematics
 from robot.parameters import parameters
-from robot.records import ARM_JOINTS, SERVOS
+from robot.records import ARM_JOINTS, SERVOS, TRACKER
 from robot.tendons import bend_from_servos, servo_angles
 from robot.urdf import urdf_text
 
@@ -31,7 +31,9 @@ class KinematicPlant:
         self._servo = np.empty(SERVOS)
         servo_angles(x[7], x[8], self._pitch, self._pulley, self._servo)
         self._next_q, self._next_servo = self._q.copy(), self._servo.copy()
-        self._measurement = Measurement(self._q, self._servo, True, 0.0)
+        self._measurement = Measurement(
+            self._q, self._servo, np.zeros(SERVOS), np.zeros((), TRACKER)
+        )
 
     def read(self) -> Measurement:
         """Exactly where it stands."""

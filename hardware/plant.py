@@ -36,14 +36,22 @@ class Measurement(NamedTuple):
     Attributes:
         q: (7,) joint angles, rad.
         servo: (4,) servo angles, rad.
+        tension: (4,) tendon tension, N.
+        tracker: () ``robot.records.TRACKER``: the newest tip pose, ``sequence`` 0 without one.
+        contact_n: largest contact force on the instrument that a sensor reads, N.
         valid: whether every device answered.
         age_s: age of the oldest value, s.
+        failed: whether the plant broke down and moves no more.
     """
 
     q: np.ndarray
     servo: np.ndarray
-    valid: bool
-    age_s: float
+    tension: np.ndarray
+    tracker: np.ndarray
+    contact_n: float = 0.0
+    valid: bool = True
+    age_s: float = 0.0
+    failed: bool = False
 
 
 class Plant(Protocol):
@@ -70,7 +78,8 @@ class Plant(Protocol):
         """Give the devices back."""
 
     def truth(self, truth: np.ndarray) -> bool:
-        """Fill tip and shaft of a (1,) ``robot.records.TRUTH``; False if the truth is unknown.
+        """Fill all but the errors of a (1,) ``robot.records.TRUTH``; False if the truth is unknown.
 
-        For reports only, never for control.
+        For reports only, never for control. ``trocar_position`` holds the trocar that the
+        controller was told, and is changed where the plant knows better.
         """

@@ -124,6 +124,7 @@ class Limits(Section):
     tip_jump_deg: Positive
     target_distance_mm: Positive
     tracking_error_rad: Positive
+    contact_force_n: Positive
 
     @model_validator(mode="after")
     def _lambda_interval(self) -> Limits:
@@ -194,6 +195,32 @@ class Control(Section):
     record_ring_seconds: Annotated[float, Field(ge=1, le=600)]
 
 
+class Simulation(Section):
+    """The simulated robot, and what stands in front of it."""
+
+    plant: Literal["physics", "kinematic"]
+    preset: Literal["ideal", "paper", "harsh"]
+    seed: Annotated[int, Field(ge=0, le=2**31 - 1)]
+    board: Literal["none", "pegboard", "silicon-sine", "silicon-arc", "ring-board"]
+
+
+class Compensation(Section):
+    """How the stretch and friction of the tendons are met."""
+
+    mode: Literal["off", "gain", "full"]
+
+
+class Tracker(Section):
+    """A tracker of the tip's pose, and how much of what it says is taken over."""
+
+    enabled: bool
+    rate_hz: Annotated[float, Field(ge=1, le=1000)]
+    delay_ms: Annotated[float, Field(ge=0, le=500)]
+    position_noise_mm: NotNegative
+    orientation_noise_deg: NotNegative
+    correction_gain: Annotated[float, Field(gt=0, le=1)]
+
+
 class Server(Section):
     """The one public port."""
 
@@ -251,6 +278,9 @@ class Configuration(Section):
     priority: Priority
     teleoperation: Teleoperation
     control: Control
+    simulation: Simulation
+    compensation: Compensation
+    tracker: Tracker
     server: Server
     arm: Arm
 

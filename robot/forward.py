@@ -37,17 +37,14 @@ def _fill(
 
 
 @compiled
-def measure_errors(
-    truth: np.ndarray, position: np.ndarray, wxyz: np.ndarray, trocar: np.ndarray
-) -> None:
+def measure_errors(truth: np.ndarray, position: np.ndarray, wxyz: np.ndarray) -> None:
     """Fill the errors of a (1,) truth record: desired minus it, and the trocar's distance from the
     shaft's axis, perpendicular to it.
 
     Args:
-        truth: (1,) ``TRUTH`` with tip pose and shaft; its error fields are filled.
+        truth: (1,) ``TRUTH`` with tip pose, shaft and trocar; its error fields are filled.
         position: (3,) desired tip, base frame, m.
         wxyz: (4,) desired tip orientation.
-        trocar: (3,) m.
     """
     t = truth[0]
     square = 0.0
@@ -60,7 +57,9 @@ def measure_errors(
     matrix_from_quaternion(wxyz, desired)
     matrix_from_quaternion(t.wxyz, actual)
     t.orientation_error = rotation_error(desired, actual, vector)
-    t.lambda_along_shaft, t.rcm_error = project_on_shaft(trocar, t.shaft_base, t.shaft_end)
+    t.lambda_along_shaft, t.rcm_error = project_on_shaft(
+        t.trocar_position, t.shaft_base, t.shaft_end
+    )
 
 
 class ForwardKinematics:

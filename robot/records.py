@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 RecordFields: TypeAlias = Any
 """A record or part of one inside compiled code, where its fields are attributes."""
@@ -97,6 +97,14 @@ class Alignment(IntEnum):
     MATCHED = 1
 
 
+class Compensation(IntEnum):
+    """How the stretch and friction of the tendons are met: not, by a gain, by both."""
+
+    OFF = 0
+    GAIN = 1
+    FULL = 2
+
+
 class ErrorSource(IntEnum):
     """What the reported errors are measured against."""
 
@@ -114,12 +122,16 @@ SETTINGS = np.dtype(
         ("hold_to_move", "i8"),
         ("lock_rotation", "i8"),
         ("lock_translation", "i8"),
+        ("lock_arm", "i8"),
+        ("compensation", "i8"),
+        ("use_tracker", "i8"),
         ("motion_scale", "f8"),
         ("lambda_reference", "f8"),
         ("rotation_base_leader", "f8", (3, 3)),
     ]
 )
-"""The operator's choices. ``rotation_base_leader`` turns leader motion into the base frame."""
+"""The operator's choices. ``rotation_base_leader`` turns leader motion into the base frame;
+``lock_arm``: the joints stand still and the segment alone follows."""
 
 LEADER = np.dtype(
     [
@@ -138,6 +150,17 @@ LEADER = np.dtype(
 rather than a motion relative to the clutch's anchor. ``smoothing_s``: time constant over which
 coarse samples are interpolated; 0 takes them as they are."""
 
+TRACKER = np.dtype(
+    [
+        ("sequence", "i8"),
+        ("age_s", "f8"),
+        ("position", "f8", 3),
+        ("wxyz", "f8", 4),
+    ]
+)
+"""A tip pose from a tracker, base frame, as it was ``age_s`` ago; ``sequence`` grows with each new
+one, and is 0 while there is none."""
+
 INPUT = np.dtype(
     [
         ("dt_s", "f8"),
@@ -147,12 +170,20 @@ INPUT = np.dtype(
         ("measured_age_s", "f8"),
         ("measured_q", "f8", ARM_JOINTS),
         ("measured_servo", "f8", SERVOS),
+        ("measured_tension", "f8", SERVOS),
+        ("measured_contact", "f8"),
+        ("plant_failed", "i8"),
+        ("tracker", TRACKER),
         ("trocar_position", "f8", 3),
         ("trocar_velocity", "f8", 3),
         ("settings", SETTINGS),
         ("leader", LEADER),
     ]
 )
+
+"""What a tick is told. ``measured_tension`` in N; ``measured_contact``: largest force in N on the
+instrument that a sensor of the scene reads, 0 without one; ``plant_failed``: the simulation broke
+down."""
 
 STATE = np.dtype(
     [
@@ -180,11 +211,23 @@ STATE = np.dtype(
         ("anchor_lock_rotation", "i8"),
         ("anchor_lock_translation", "i8"),
         ("anchor_rotation_base_leader", "f8", (3, 3)),
+        ("friction", "f8", 2),
+        ("compensation", "i8"),
+        ("tracker_sequence", "i8"),
+        ("lagged_position", "f8", 3),
+        ("lagged_rotation", "f8", (3, 3)),
+        ("correction_position", "f8", 3),
+        ("correction_rotation", "f8", 3),
+        ("contact_allowance", "f8"),
     ]
 )
 """Everything the robot remembers. ``x`` is the commanded configuration; the ``arm_*`` and ``tip_*``
 fields are its forward kinematics, kept so that each tick computes them once (``arm_jacobian``:
-rows linear then angular, of the point that coincides with the base origin, base frame)."""
+rows linear then angular, of the point that coincides with the base origin, base frame).
+``friction``: the part of the tendons' friction that the servos take up (2,), share of full;
+``lagged_*``: the commanded tip as old as the tracker's samples; ``correction_*``: what the tracker
+says that the commanded tip is off (m, rotation vector in rad, base frame); ``contact_allowance``:
+the contact force in N above which motion pauses."""
 
 COMMAND = np.dtype(
     [
@@ -230,13 +273,24 @@ TRUTH = np.dtype(
         ("q", "f8", ARM_JOINTS),
         ("uv", "f8", 2),
         ("lambda_along_shaft", "f8"),
+        ("trocar_position", "f8", 3),
+        ("tension", "f8", SERVOS),
+        ("contact_count", "i8"),
+        ("contact_force", "f8"),
+        ("rings_passed", "i8"),
+        ("rings_touched", "i8"),
+        ("ball_position", "f8", 3),
+        ("ball_progress", "f8"),
         ("position_error", "f8"),
         ("orientation_error", "f8"),
         ("rcm_error", "f8"),
     ]
 )
 """Where the robot is: the simulator's truth, or the forward kinematics of what was measured
-(``source``, an :class:`ErrorSource`), and the errors against it: desired minus it."""
+(``source``, an :class:`ErrorSource`), and the errors against it: desired minus it.
+``trocar_position``: where the trocar is, against which the RCM error counts; ``tension`` in N;
+``contact_force``: largest contact force on the instrument in N; ``rings_*``: a bit for each ring of
+the board; ``ball_progress``: 0 at the groove's start, 1 at its end."""
 
 HEADER = np.dtype(
     [

@@ -20,6 +20,7 @@ from robot.records import (
     SCHEMA_VERSION,
     SETTINGS,
     Alignment,
+    Compensation,
     Coordinates,
     ErrorSource,
     LeaderKind,
@@ -40,6 +41,12 @@ SOLVER_NAMES = {
 COORDINATE_NAMES = {"uv": Coordinates.UV, "polar": Coordinates.POLAR}
 ALIGNMENT_NAMES = {"relative": Alignment.RELATIVE, "matched": Alignment.MATCHED}
 
+COMPENSATION_NAMES = {
+    "off": Compensation.OFF,
+    "gain": Compensation.GAIN,
+    "full": Compensation.FULL,
+}
+
 
 def default_settings(configuration: Configuration) -> np.ndarray:
     """The (1,) operator settings that the configuration starts with."""
@@ -52,6 +59,8 @@ def default_settings(configuration: Configuration) -> np.ndarray:
     settings["alignment"] = ALIGNMENT_NAMES[teleoperation.alignment]
     settings["hold_to_move"] = teleoperation.hold_to_move
     settings["motion_scale"] = teleoperation.motion_scale
+    settings["compensation"] = COMPENSATION_NAMES[configuration.compensation.mode]
+    settings["use_tracker"] = configuration.tracker.enabled
     settings["lambda_reference"] = priority.lambda_reference
     settings["rotation_base_leader"] = np.eye(3)
     return settings
@@ -104,6 +113,7 @@ class ControlLoop:
         self._in_leader = self._in["leader"]
         self._measured_q = self._in["measured_q"]
         self._measured_servo = self._in["measured_servo"]
+        self._measured_tension = self._in["measured_tension"]
         self._next_state = self._outcome["state"]
         self._desired_position = self._outcome["report"]["desired_position"][0]
         self._desired_wxyz = self._outcome["report"]["desired_wxyz"][0]
@@ -164,6 +174,10 @@ class ControlLoop:
         tick_input = self._in
         self._measured_q[:] = measurement.q
         self._measured_servo[:] = measurement.servo
+        self._measured_tension[:] = measurement.tension
+        tick_input["tracker"] = measurement.tracker
+        tick_input["measured_contact"] = measurement.contact_n
+        tick_input["plant_failed"] = measurement.failed
         tick_input["measured_valid"] = measurement.valid
         tick_input["measured_age_s"] = measurement.age_s
         tick_input["dt_s"] = self._dt_ns * 1e-9
@@ -180,6 +194,7 @@ class ControlLoop:
 
     def _measure(self) -> None:
         truth = self._truth
+        truth["trocar_position"] = self._in["trocar_position"]
         source = ErrorSource.TRUE
         if not self.plant.truth(truth):
             source = ErrorSource.MEASURED
@@ -188,9 +203,7 @@ class ControlLoop:
             u, v = bend_from_servos(measurement.servo, p["pitch_radius"], p["pulley_radius"])
             self._forward.fill(truth, measurement.q, u, v)
         truth["source"] = source
-        measure_errors(
-            truth, self._desired_position, self._desired_wxyz, self._in["trocar_position"]
-        )
+        measure_errors(truth, self._desired_position, self._desired_wxyz)
 
     def step(self) -> None:
         """Read, tick, write, advance, measure; ``record`` then tells everything about it."""

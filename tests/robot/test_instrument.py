@@ -79,7 +79,8 @@ def test_errors_are_distance_angle_and_distance_from_the_shaft(rng: np.random.Ge
         own, wanted = random_rotation(rng), random_rotation(rng)
         truth["shaft_base"], truth["shaft_end"], truth["position"] = base, end, tip
         truth["wxyz"] = wxyz(own)
-        measure_errors(truth, desired, wxyz(wanted), trocar)
+        truth["trocar_position"] = trocar
+        measure_errors(truth, desired, wxyz(wanted))
         found = truth[0]
         assert found["position_error"] == pytest.approx(np.linalg.norm(desired - tip), abs=1e-14)
         assert found["orientation_error"] == pytest.approx(
