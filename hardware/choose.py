@@ -1,0 +1,19 @@
+"""Which robot stands behind the controller."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hardware.kinematic_plant import KinematicPlant
+from hardware.plant import Plant
+from robot.configuration import Configuration
+
+
+def make_plant(configuration: Configuration, x: np.ndarray) -> Plant:
+    """The plant that ``configuration.simulation`` names, standing at ``x``.
+
+    Args:
+        configuration: describes robot and simulation.
+        x: (10,) the controller's configuration at the start.
+    """
+    return KinematicPlant(configuration, x)
