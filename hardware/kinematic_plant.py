@@ -11,6 +11,7 @@ from robot.parameters import parameters
 from robot.records import ARM_JOINTS, SERVOS, TRACKER
 from robot.tendons import bend_from_servos, servo_angles
 from robot.urdf import urdf_text
+from scenes.boards.board import Board
 
 
 class KinematicPlant:
@@ -61,6 +62,12 @@ class KinematicPlant:
 
     def close(self) -> None:
         """There are no devices to give back."""
+
+    def change_board(self, board: Board) -> None:
+        """Nothing touches anything here."""
+
+    def register_trocar(self, position: np.ndarray) -> None:
+        """Nothing to note: the controller's kinematics are exact."""
 
     def truth(self, truth: np.ndarray) -> bool:
         """Forward kinematics of where it stands, through servos and tendons."""

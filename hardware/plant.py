@@ -6,6 +6,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from scenes.boards.board import Board
+
 
 class Actuator(NamedTuple):
     """One driven axis: its name and the unit of its position."""
@@ -76,6 +78,18 @@ class Plant(Protocol):
 
     def close(self) -> None:
         """Give the devices back."""
+
+    def change_board(self, board: Board) -> None:
+        """Put another board before the instrument. Only while the robot is DISABLED; may take
+        longer than a tick.
+        """
+
+    def register_trocar(self, position: np.ndarray) -> None:
+        """The controller takes the trocar to rest at ``position`` (3,), base frame, m, from now on.
+
+        A plant whose kinematics differ from the controller's notes where that truly is, for
+        :meth:`truth`.
+        """
 
     def truth(self, truth: np.ndarray) -> bool:
         """Fill all but the errors of a (1,) ``robot.records.TRUTH``; False if the truth is unknown.

@@ -21,6 +21,8 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0, le=2, allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
+BreathingAmplitude = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False)]
+BreathingPeriod = Annotated[float, Field(ge=1, le=20, allow_inf_nan=False)]
 
 
 def _unit(value: Vector) -> Vector:
@@ -45,12 +47,14 @@ class Section(BaseModel):
 
 
 class Trocar(Section):
-    """Where the shaft passes the body wall (base frame), and the wall's looks."""
+    """Where the shaft passes the body wall (base frame), the wall's looks, and its breathing."""
 
     position_m: Vector
     wall_normal: Direction
     wall_radius_m: Length
     wall_thickness_m: Length
+    breathing_amplitude_mm: BreathingAmplitude
+    breathing_period_s: BreathingPeriod
 
 
 class Start(Section):

@@ -32,6 +32,8 @@ from robot.rotations import matrix_from_quaternion, multiply, quaternion_from_ma
 from robot.tendons import bend_from_servos
 from robot.urdf import urdf_text
 from scenes.path import Path
+from server.control.trocar import LoopTrocar, ShaftFinder
+from server.memory.link_records import TrocarSource
 
 SOLVER_NAMES = {
     "hqp": Solver.HQP,
@@ -75,7 +77,7 @@ class ControlLoop:
         leader: (1,) ``LEADER``: the active leader's newest sample.
         request: a ``Request`` for the next step; consumed by it.
         hold: 1 while the hold-to-move key is down.
-        trocar_position: (3,) m, base frame. trocar_velocity: (3,) m/s.
+        trocar: where it is, and how it breathes.
     """
 
     def __init__(self, robot: InstrumentRobot, plant: Plant, configuration: Configuration) -> None:
@@ -85,8 +87,8 @@ class ControlLoop:
         self.leader = np.zeros(1, LEADER)
         self.request: int = Request.NONE
         self.hold = 0
-        self.trocar_position = np.array(configuration.trocar.position_m)
-        self.trocar_velocity = np.zeros(3)
+        self.trocar = LoopTrocar(configuration)
+        self._shaft = ShaftFinder(configuration)
         self._state = robot.initial_state()
         self._forward = ForwardKinematics(urdf_text(configuration), robot.parameters)
         self._path: Path | None = None
@@ -119,7 +121,44 @@ class ControlLoop:
         self._desired_wxyz = self._outcome["report"]["desired_wxyz"][0]
         self._leader_position = self._in["leader"]["position"]
         self._leader_wxyz = self._in["leader"]["wxyz"]
-        self._in["trocar_position"][:] = self.trocar_position
+        self._in["trocar_position"][:] = self.trocar.position
+
+    @property
+    def time_s(self) -> float:
+        """The plant's clock, s."""
+        return float(self._header["time_ns"]) * 1e-9
+
+    @property
+    def safety(self) -> Safety:
+        """The safety state."""
+        return Safety(int(self._state["safety"][0]))
+
+    @property
+    def trocar_position(self) -> np.ndarray:
+        """(3,) where the controller was told that the trocar is, base frame, m."""
+        return self.trocar.position
+
+    @property
+    def trocar_velocity(self) -> np.ndarray:
+        """(3,) how it was told that the trocar moves, m/s."""
+        return self.trocar.velocity
+
+    def register_trocar(self, source: TrocarSource, position: np.ndarray) -> None:
+        """Take the trocar to be at ``position`` (3,), base frame, m; not while ENABLED."""
+        self.trocar.register(source, position, self.time_s)
+        self.plant.register_trocar(self.trocar.registered)
+
+    def _check_trocar(self) -> None:
+        """Before enabling: refuse it with the shaft outside of the trocar, else lead it there."""
+        state, trocar = self._state[0], self.trocar
+        if state["safety"] == Safety.ENABLED:
+            return
+        self._shaft.find(state["safety"], state["x"], self.plant.read().q)
+        stand = self._shaft.stand(trocar.at(self.time_s))
+        if self._shaft.is_inserted(stand):
+            trocar.lead(stand, self.time_s)
+        else:
+            self.request = Request.NONE
 
     @property
     def path(self) -> Path | None:
@@ -183,8 +222,8 @@ class ControlLoop:
         tick_input["dt_s"] = self._dt_ns * 1e-9
         tick_input["request"] = self.request
         tick_input["hold"] = self.hold
-        tick_input["trocar_position"] = self.trocar_position
-        tick_input["trocar_velocity"] = self.trocar_velocity
+        tick_input["trocar_position"] = self.trocar.position
+        tick_input["trocar_velocity"] = self.trocar.velocity
         tick_input["settings"] = self.settings[0]
         if self._path is not None:
             self._path_leader(self._path)
@@ -194,7 +233,7 @@ class ControlLoop:
 
     def _measure(self) -> None:
         truth = self._truth
-        truth["trocar_position"] = self._in["trocar_position"]
+        truth["trocar_position"] = self.trocar.actual
         source = ErrorSource.TRUE
         if not self.plant.truth(truth):
             source = ErrorSource.MEASURED
@@ -208,6 +247,9 @@ class ControlLoop:
     def step(self) -> None:
         """Read, tick, write, advance, measure; ``record`` then tells everything about it."""
         started = time.perf_counter_ns()
+        if self.request == Request.ENABLE:
+            self._check_trocar()
+        self.trocar.look(self.time_s, self._dt_ns * 1e-9)
         self._read()
         self.robot.tick(self._state, self._input, self._outcome)
         header = self._header
@@ -219,4 +261,6 @@ class ControlLoop:
         header["tick"] = self._state["tick"][0]
         header["dt_ns"] = self._dt_ns
         header["time_ns"] += self._dt_ns
+        if self._state["safety"][0] != Safety.ENABLED:
+            self.trocar.follow()
         self._advance_path()

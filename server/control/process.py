@@ -30,6 +30,7 @@ from server.memory.run_directory import RunDirectory
 
 if TYPE_CHECKING:
     from server.control.runner import ControlRunner
+    from server.control.trocar import LoopTrocar
 
 _LOCK_PATIENCE_S = 10.0
 
@@ -58,6 +59,18 @@ class Status:
         self._record["phase"] = int(phase)
         for name, text in {"message": message, **more}.items():
             self._record[name] = text.encode()
+        self._write()
+
+    def show(self, trocar: LoopTrocar, board: str) -> None:
+        """Publish where the trocar is registered, how it breathes, and which board is there."""
+        record, breathing = self._record, trocar.motion.wanted()
+        record["trocar_source"], record["trocar_registered"] = trocar.source, trocar.registered
+        record["breathing_amplitude"] = breathing.amplitude_m
+        record["breathing_period"] = breathing.period_s
+        record["board"] = board.encode()
+        self._write()
+
+    def _write(self) -> None:
         self._record["stamp_ns"] = time.monotonic_ns()
         self._link.write_status(self._record)
 
@@ -78,7 +91,7 @@ def _run(directory: RunDirectory, configuration: Configuration, lifeline: Lifeli
     link = ControlLink(directory.path)
     status = Status(link, configuration.control.rate_hz)
     status.say(Phase.STARTING, "loading the controller")
-    from hardware.kinematic_plant import KinematicPlant
+    from hardware.choose import make_plant
     from robot.instrument_robot import InstrumentRobot
     from server.control import realtime
     from server.control.loop import ControlLoop
@@ -89,10 +102,13 @@ def _run(directory: RunDirectory, configuration: Configuration, lifeline: Lifeli
     robot = InstrumentRobot(configuration)
     warm_up(robot, configuration)
     start = robot.initial_state()["x"][0]
-    plant = KinematicPlant(configuration, start)
+    plant = make_plant(configuration, start)
     try:
         loop = ControlLoop(robot, plant, configuration)
-        runner = ControlRunner(loop, link, lifeline, configuration.control.rate_hz)
+        runner = ControlRunner(
+            loop, link, lifeline, configuration, lambda: status.show(loop.trocar, runner.board)
+        )
+        status.show(loop.trocar, runner.board)
         signal.signal(signal.SIGTERM, lambda *_: runner.stop())
         words = realtime.enter(configuration.control.realtime)
         status.say(Phase.RUNNING, "running", realtime=words, plant=plant.spec.name)

@@ -5,11 +5,14 @@ from __future__ import annotations
 import contextlib
 import gc
 import time
+from collections.abc import Callable
 
 import numpy as np
 
-from robot.records import Request
+from robot.configuration import Configuration
+from robot.records import Request, Safety
 from robot.safety import Event, apply_event
+from scenes.boards.board import BOARD_NAMES, board
 from server.control.lifeline import Lifeline
 from server.control.loop import ControlLoop
 from server.control.mapped_path import MappedPath
@@ -32,14 +35,26 @@ class ControlRunner:
         loop: what is stepped.
         link: where requests come from and records go.
         lifeline: cut when the supervisor is gone.
-        rate_hz: ticks a second.
+        configuration: of the robot; tells the rate and where boards stand.
+        changed: called after the board, the trocar or its breathing has changed.
+
+    Attributes:
+        board: name of the board before the instrument.
     """
 
     def __init__(
-        self, loop: ControlLoop, link: ControlLink, lifeline: Lifeline, rate_hz: float
+        self,
+        loop: ControlLoop,
+        link: ControlLink,
+        lifeline: Lifeline,
+        configuration: Configuration,
+        changed: Callable[[], None] = lambda: None,
     ) -> None:
         self._loop, self._link, self._lifeline = loop, link, lifeline
-        self._period_ns = round(1e9 / rate_hz)
+        self._configuration, self._changed = configuration, changed
+        self.board: str = configuration.simulation.board
+        self._period_ns = round(1e9 / configuration.control.rate_hz)
+        self._excused = False
         # The link writes the active leader's sample right where the loop reads it.
         loop.leader = link.leader
         self._header = loop.record["header"][0]
@@ -64,8 +79,9 @@ class ControlRunner:
             lateness_ns = now_ns - deadline_ns
             missed = lateness_ns // period_ns
             if missed > 0:
-                overruns += missed
+                overruns += 0 if self._excused else missed
                 deadline_ns += missed * period_ns
+            self._excused = False
             header["lateness_ns"], header["overruns"] = lateness_ns, overruns
             self._tick(now_ns)
             deadline_ns += period_ns
@@ -94,12 +110,29 @@ class ControlRunner:
             loop.stop_path()
         if link.path_start is not None:
             self._start_path(link.path_start)
+        if link.trocar_change is not None and loop.safety in (Safety.DISABLED, Safety.PAUSED):
+            loop.register_trocar(*link.trocar_change)
+            self._changed()
+        if link.breathing is not None:
+            loop.trocar.breathe(link.breathing, loop.time_s)
+            self._changed()
+        if link.board is not None and loop.safety == Safety.DISABLED:
+            self._change_board(BOARD_NAMES[link.board])
 
     def _start_path(self, wanted: PathStart) -> None:
         """Play a path; whoever asked sees by the record's ``path_id`` that it plays."""
         with contextlib.suppress(OSError, ValueError):
             path = MappedPath(wanted.file, wanted.rows, f"path {wanted.path_id}")
             self._loop.start_path(path, wanted.path_id)
+
+    def _change_board(self, name: str) -> None:
+        """Put another board before the instrument; the ticks that are missed meanwhile are no
+        overruns, for a disabled robot waits for none.
+        """
+        self._loop.plant.change_board(board(name, self._configuration))
+        self.board = name
+        self._excused = True
+        self._changed()
 
     def _between_ticks(self, deadline_ns: int) -> None:
         """What may be done rarely, in the time left until the next deadline."""

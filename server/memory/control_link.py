@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot.records import LEADER, RECORD, SETTINGS, Request
+from scenes.trocar_motion import Breathing
 from server.control.leader_choice import NOBODY, LeaderChoice
 from server.memory.link_records import (
     ALIVE,
     ALIVE_FILE,
+    BOARD_CHANGE,
+    BREATHING_CHANGE,
     EMERGENCY,
     EMERGENCY_FILE,
     HOLD_FILE,
@@ -30,6 +33,8 @@ from server.memory.link_records import (
     STATUS_FILE,
     SUPERVISION,
     SUPERVISION_FILE,
+    TROCAR_CHANGE,
+    TrocarSource,
     leader_file,
     path_file,
 )
@@ -55,6 +60,13 @@ class PathStart(NamedTuple):
     path_id: int
 
 
+class TrocarChange(NamedTuple):
+    """A trocar to register: how, and where (3,), base frame, m."""
+
+    source: TrocarSource
+    position: NDArray[np.float64]
+
+
 class ControlLink:
     """What the web process wants, read once a tick by :meth:`poll`, and the way back.
 
@@ -71,6 +83,9 @@ class ControlLink:
         settings_changed: whether new settings came in with this tick.
         path_start: a path to start in this tick, or None.
         path_stop: whether to stop the path in this tick.
+        trocar_change: a trocar to register in this tick, or None.
+        breathing: how the trocar shall breathe from now on, or None for no change.
+        board: the board to put before the instrument, its place among the boards' names, or None.
         hold: 1 while hold-to-move is pressed and freshly so, else 0.
         leader: (1,) LEADER, the active leader's newest sample with ``age_s`` set.
 
@@ -105,6 +120,9 @@ class ControlLink:
         self.settings_changed = False
         self.path_start: PathStart | None = None
         self.path_stop = False
+        self.trocar_change: TrocarChange | None = None
+        self.breathing: Breathing | None = None
+        self.board: int | None = None
         self.hold = 0
         self.leader = np.zeros(1, dtype=LEADER)
         self.leader["wxyz"][0, 0] = 1.0
@@ -115,7 +133,7 @@ class ControlLink:
         """Read what is new and set the attributes for the tick that follows."""
         self.request = int(Request.NONE)
         self.settings_changed = self.path_stop = False
-        self.path_start = None
+        self.path_start = self.trocar_change = self.breathing = self.board = None
         if self._emergency.sequence != self._emergencies:
             self._emergencies = self._emergency.sequence
             self._drop_requests()
@@ -151,9 +169,21 @@ class ControlLink:
                 self.path_start = PathStart(file, int(message["path_rows"]), path_id)
             elif kind == PATH_STOP:
                 self.path_stop = True
+            elif kind in (TROCAR_CHANGE, BREATHING_CHANGE, BOARD_CHANGE):
+                self._take_change(kind, message)
             elif kind in _REQUESTS:
                 self.request = kind
             return
+
+    def _take_change(self, kind: int, message: np.void) -> None:
+        if kind == TROCAR_CHANGE:
+            source = TrocarSource(int(message["trocar_source"]))
+            self.trocar_change = TrocarChange(source, message["trocar_position"].copy())
+        elif kind == BREATHING_CHANGE:
+            amplitude, period = message["breathing_amplitude"], message["breathing_period"]
+            self.breathing = Breathing(float(amplitude), float(period))
+        else:
+            self.board = int(message["board"])
 
     def _take_settings(self, message: NDArray[Any]) -> None:
         self.settings[0] = message["settings"]

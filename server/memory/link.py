@@ -20,9 +20,12 @@ from numpy.typing import NDArray
 
 from robot.errors import InvalidPose
 from robot.records import RECORD, LeaderKind, Request
+from scenes.trocar_motion import Breathing
 from server.memory.link_records import (
     ALIVE,
     ALIVE_FILE,
+    BOARD_CHANGE,
+    BREATHING_CHANGE,
     EMERGENCY,
     EMERGENCY_FILE,
     HOLD_FILE,
@@ -41,8 +44,10 @@ from server.memory.link_records import (
     STATUS_FILE,
     SUPERVISION,
     SUPERVISION_FILE,
+    TROCAR_CHANGE,
     ControlState,
     Phase,
+    TrocarSource,
     leader_file,
     path_file,
 )
@@ -134,6 +139,27 @@ class WebLink:
     def stop_path(self) -> int:
         """Stop the path that plays, if any; returns the number to wait for."""
         return self._send(PATH_STOP)
+
+    def register_trocar(self, source: TrocarSource, position: NDArray[np.float64]) -> int:
+        """Say where the trocar is, (3,), base frame, m; returns the number to wait for.
+
+        Control takes it only while the robot is DISABLED or PAUSED; :meth:`status` tells.
+        """
+        return self._send(TROCAR_CHANGE, trocar_source=int(source), trocar_position=position)
+
+    def breathe(self, breathing: Breathing) -> int:
+        """Say how the trocar breathes; returns the number to wait for."""
+        return self._send(
+            BREATHING_CHANGE,
+            breathing_amplitude=breathing.amplitude_m,
+            breathing_period=breathing.period_s,
+        )
+
+    def change_board(self, board: int) -> int:
+        """Ask for the board at that place among ``scenes.boards.board.BOARD_NAMES``; returns the
+        number to wait for. Control takes it only while the robot is DISABLED.
+        """
+        return self._send(BOARD_CHANGE, board=board)
 
     def emergency_stop(self) -> int:
         """Stop all motion: control acts on it in the tick in which it sees it.
@@ -228,8 +254,9 @@ class WebLink:
 
         Returns:
             ``control`` ("starting", "running" or "down"), ``phase``, ``message``, ``pid``,
-            ``rate_hz``, ``realtime``, ``plant``, ``control_restarts``, ``web_restarts`` and
-            ``paths`` (names by path id).
+            ``rate_hz``, ``realtime``, ``plant``, ``board``, ``trocar_source``,
+            ``trocar_registered`` ((3,), m), ``breathing``, ``control_restarts``, ``web_restarts``
+            and ``paths`` (names by path id).
         """
         status = self._read_or_zero(self._status, STATUS)[0]
         supervision = self._read_or_zero(self._supervision, SUPERVISION)[0]
@@ -250,6 +277,12 @@ class WebLink:
             "rate_hz": float(status["rate_hz"]),
             "realtime": status["realtime"].decode(errors="replace"),
             "plant": status["plant"].decode(errors="replace"),
+            "board": status["board"].decode(errors="replace"),
+            "trocar_source": TrocarSource(int(status["trocar_source"])),
+            "trocar_registered": status["trocar_registered"].copy(),
+            "breathing": Breathing(
+                float(status["breathing_amplitude"]), float(status["breathing_period"])
+            ),
             "control_restarts": int(supervision["control_restarts"]),
             "web_restarts": int(supervision["web_restarts"]),
             "paths": paths,
@@ -262,20 +295,17 @@ class WebLink:
         except MappedReadError:
             return np.zeros(1, dtype=dtype)
 
-    def _send(self, kind: int, settings: NDArray[Any] | None = None) -> int:
+    def _send(self, kind: int, **fields: Any) -> int:
         with self._lock:
-            return self._send_locked(kind, settings)
+            return self._send_locked(kind, **fields)
 
-    def _send_locked(
-        self, kind: int, settings: NDArray[Any] | None = None, path_id: int = 0, path_rows: int = 0
-    ) -> int:
+    def _send_locked(self, kind: int, **fields: Any) -> int:
         message = np.zeros(1, dtype=REQUEST_MESSAGE)
         number = self._requests.sequence + 1
         message["sequence"], message["kind"] = number, int(kind)
-        message["path_id"], message["path_rows"] = path_id, path_rows
         message["stamp_ns"] = time.monotonic_ns()
-        if settings is not None:
-            message["settings"] = settings
+        for name, value in fields.items():
+            message[name] = value
         self._requests.push(message)
         return number
 

@@ -17,6 +17,9 @@ from server.memory.mapped import MappedRing, MappedSlot
 SETTINGS_CHANGE = 100
 PATH_START = 101
 PATH_STOP = 102
+TROCAR_CHANGE = 103
+BREATHING_CHANGE = 104
+BOARD_CHANGE = 105
 """Kinds of REQUEST_MESSAGE beside those of :class:`robot.records.Request`."""
 
 
@@ -37,6 +40,14 @@ class ControlState(IntEnum):
     DOWN = 2
 
 
+class TrocarSource(IntEnum):
+    """How the trocar came to be where it is taken to be."""
+
+    CONFIGURATION = 0
+    TOUCH = 1
+    ENTER = 2
+
+
 REQUEST_MESSAGE = np.dtype(
     [
         ("sequence", "i8"),
@@ -45,9 +56,15 @@ REQUEST_MESSAGE = np.dtype(
         ("path_rows", "i8"),
         ("stamp_ns", "i8"),
         ("settings", SETTINGS),
+        ("trocar_source", "i8"),
+        ("trocar_position", "f8", 3),
+        ("breathing_amplitude", "f8"),
+        ("breathing_period", "f8"),
+        ("board", "i8"),
     ]
 )
-"""Web to control: a Request, SETTINGS_CHANGE, PATH_START or PATH_STOP."""
+"""Web to control: a Request or one of the kinds above, with the fields that belong to it: SI, base
+frame; ``board`` is a place in ``scenes.boards.board.BOARD_NAMES``."""
 
 EMERGENCY = np.dtype([("count", "i8"), ("stamp_ns", "i8")])
 """Web to control: a press of the emergency stop. That it was written at all is the press."""
@@ -69,6 +86,11 @@ STATUS = np.dtype(
         ("stamp_ns", "i8"),
         ("realtime", "S192"),
         ("plant", "S32"),
+        ("board", "S32"),
+        ("trocar_source", "i8"),
+        ("trocar_registered", "f8", 3),
+        ("breathing_amplitude", "f8"),
+        ("breathing_period", "f8"),
         ("message", "S256"),
     ]
 )

@@ -64,7 +64,9 @@ def web(tmp_path: Path) -> WebLink:
 
 def make_runner(robot: InstrumentRobot, plant: BreakingPlant, folder: Path) -> ControlRunner:
     loop = ControlLoop(robot, plant, robot.configuration)
-    return ControlRunner(loop, ControlLink(folder), Lifeline(None), RATE_HZ)
+    control = robot.configuration.control.model_copy(update={"rate_hz": RATE_HZ})
+    configuration = robot.configuration.model_copy(update={"control": control})
+    return ControlRunner(loop, ControlLink(folder), Lifeline(None), configuration)
 
 
 def test_a_failing_tick_holds_marks_a_fault_and_ends(
