@@ -1,0 +1,1 @@
+"""The simulated robot: physics that shares nothing with the controller's kinematics."""

@@ -1,0 +1,252 @@
+"""The physics plant: a robot that knows nothing of the controller."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+
+from hardware.physics.actuation import ACTUATION, DRIVES, drive_joints, drive_tendons
+from hardware.physics.contact import ContactWatch
+from hardware.physics.model import SPEED_DAMPING_S, STEP_S, build
+from hardware.physics.preset import PRESETS, draw
+from hardware.physics.tracker import TipTracker
+from hardware.plant import Actuator, Measurement, PlantSpec
+from robot.configuration import Configuration
+from robot.records import ARM_JOINTS, SERVOS
+from robot.rotations import quaternion_from_matrix
+from robot.tendons import servo_angles
+from scenes.boards.board import Board
+
+_EXERCISE_RAD = 0.2
+_EXERCISE_SHRINKS = 0.75
+_EXERCISES = 16
+_EXERCISE_S = 0.12
+_SETTLE_S = 0.4
+
+
+class PhysicsPlant:
+    """Arm, tendon-driven instrument and board in MuJoCo, bitwise repeatable from the seed.
+
+    What it measures is what a real robot would: joint encoders, servo positions, tension at the
+    servos, a force sensor under the board, a tracker of the tip. The trocar is a place that the
+    shaft went through when it was put in; it exerts no force.
+
+    Raises:
+        KeyError: the preset does not exist.
+    """
+
+    def __init__(self, configuration: Configuration, x: np.ndarray, board: Board) -> None:
+        """Build the robot, bring it to ``x`` (10,) as a real one would get there, and let it rest.
+
+        Args:
+            configuration: dimensions; ``simulation`` chooses preset and seed.
+            x: (10,) the controller's configuration at the start.
+            board: what stands in front of it.
+        """
+        simulation = configuration.simulation
+        self._configuration = configuration
+        self._preset = PRESETS[simulation.preset]
+        robot, noise = np.random.default_rng(simulation.seed).spawn(2)
+        self._drawn = draw(self._preset, robot)
+        joints = tuple(Actuator(joint.name, "rad") for joint in configuration.arm.joints)
+        servos = tuple(Actuator(f"servo{index}", "rad") for index in range(1, SERVOS + 1))
+        tick_ns = round(1e9 / configuration.control.rate_hz)
+        self.spec = PlantSpec("physics", joints + servos, tick_ns, True)
+        self._steps = max(1, round(tick_ns * 1e-9 / STEP_S))
+        self._time_ns = 0
+        self._released = False
+        self._failed = False
+        self._drives = np.zeros(1, DRIVES)
+        self._q_rest, self._rest = np.empty(ARM_JOINTS), np.empty(SERVOS)
+        self._trocar_offset = np.zeros(3)
+        self._servo, self._tension = np.zeros(SERVOS), np.zeros(SERVOS)
+        self._q = np.zeros(ARM_JOINTS)
+        self._assemble(board)
+        self._constants = self._actuation()
+        self._wake(x)
+        self._tracker = TipTracker(configuration.tracker, noise)
+        self._sense()
+        self.register_trocar(np.array(configuration.trocar.position_m))
+
+    def _assemble(self, board: Board) -> None:
+        """Compile the model and take the views into it: making one costs as much as a step."""
+        self._physics = build(self._configuration, self._preset, self._drawn, board)
+        model = self._model = self._physics.model
+        # One step takes as long as the tick allows, so that a tick is a whole number of steps.
+        model.opt.timestep = self.spec.tick_ns * 1e-9 / self._steps
+        data = self._data = mujoco.MjData(model)
+        base, end = self._physics.shaft_sites
+        self._tip = data.site_xpos[self._physics.tip_site]
+        self._tip_rotation = data.site_xmat[self._physics.tip_site].reshape(3, 3)
+        self._shaft_base, self._shaft_end = data.site_xpos[base], data.site_xpos[end]
+        self._arm = slice(int(self._physics.arm_positions[0]), ARM_JOINTS)
+        self._rest_angles = model.qpos_spring[self._arm]
+        self._stiffness, self._springs = model.tendon_stiffness, model.tendon_lengthspring[:, 1]
+        self._length = data.ten_length
+        mujoco.mj_forward(model, data)
+        self._watch = ContactWatch(self._physics, board)
+
+    def _actuation(self) -> np.ndarray:
+        preset, drawn, module = self._preset, self._drawn, self._configuration.module
+        tick = 2.0 * math.pi / module.servo_ticks_per_turn
+        values: dict[str, object] = {
+            "step_s": self._model.opt.timestep,
+            "joint_lag_s": preset.joint_lag_s,
+            "joint_lead_s": SPEED_DAMPING_S,
+            "servo_lag_s": preset.servo_lag_s,
+            "servo_speed": preset.servo_speed_rad_s,
+            "servo_tick": tick if preset.servo_ticks else 0.0,
+            "pulley_radius": module.pulley_radius_m,
+            "tendon_length": self._length,
+            "tendon_stiffness": drawn.stiffness_n_m,
+            "pretension": drawn.pretension_n,
+            "friction": drawn.friction_n,
+            # Without friction the spring has no force; its stiffness only must not be zero.
+            "stick": np.maximum(drawn.friction_n, 1e-3) / preset.tendon_stick_m,
+        }
+        constants = np.zeros(1, ACTUATION)
+        for name, value in values.items():
+            constants[name] = value
+        return constants
+
+    def _wake(self, x: np.ndarray) -> None:
+        """Go to ``x`` and move to and fro around it, less and less, as a homing would.
+
+        What friction still holds then is near the middle of what it can.
+        """
+        q, drives = x[:ARM_JOINTS], self._drives
+        self._data.qpos[self._arm] = q
+        drives["q_wanted"], drives["q_reference"] = q, q
+        mujoco.mj_forward(self._model, self._data)
+        drives["anchor"] = self._length
+        swing = _EXERCISE_RAD
+        for _ in range(_EXERCISES):
+            self._bend_to(x[7] + swing, x[8] + swing, _EXERCISE_S)
+            swing *= -_EXERCISE_SHRINKS
+        self._bend_to(x[7], x[8], _EXERCISE_S)
+        self._bend_to(x[7], x[8], _SETTLE_S)
+
+    def _bend_to(self, u: float, v: float, duration_s: float) -> None:
+        instrument, module = self._configuration.instrument, self._configuration.module
+        goal = np.empty(SERVOS)
+        servo_angles(u, v, instrument.tendon_pitch_radius_m, module.pulley_radius_m, goal)
+        start = self._drives["servo_wanted"][0].copy()
+        count = max(1, round(duration_s / self._model.opt.timestep))
+        for step in range(count):
+            self._drives["servo_wanted"] = start + (goal - start) * min(1.0, 1.5 * step / count)
+            self._step()
+
+    def _step(self) -> None:
+        drives = self._drives
+        drive_joints(drives, self._constants, self._q_rest)
+        self._rest_angles[:] = self._q_rest
+        drive_tendons(drives, self._constants, self._length, self._stiffness, self._rest)
+        self._springs[:] = self._rest
+        if self._released:
+            self._springs[:] = 1.0
+        mujoco.mj_step(self._model, self._data)
+
+    def _sense(self) -> None:
+        mujoco.mj_kinematics(self._model, self._data)
+        self._q[:] = self._data.qpos[self._arm]
+        self._servo[:] = self._drives["servo"][0]
+        self._tension[:] = self._drives["tension"][0]
+        self._tracker.look(self._time_ns, self._tip, self._tip_rotation)
+        self._watch.look(self._data, self._tip)
+        self._measurement = Measurement(
+            self._q,
+            self._servo,
+            self._tension,
+            self._tracker.newest,
+            contact_n=self._watch.force_n,
+            failed=self._failed,
+        )
+
+    def read(self) -> Measurement:
+        """What the sensors said at the end of the last tick."""
+        return self._measurement
+
+    def write(self, command: np.ndarray) -> None:
+        """Take the command; servos and joints follow it with their lags."""
+        self._drives["q_wanted"] = command["q"]
+        self._drives["servo_wanted"] = command["servo"]
+
+    def advance(self) -> int:
+        """Let one tick pass. A simulation that breaks down stands still from then on."""
+        if not self._failed:
+            before = self._data.time
+            for _ in range(self._steps):
+                self._step()
+            # After a blow-up the engine silently starts from its initial state.
+            passed = self._data.time - before
+            expected = self._steps * self._model.opt.timestep
+            whole = abs(passed - expected) < 0.5 * self._model.opt.timestep
+            self._failed = not (whole and bool(np.isfinite(self._data.qpos).all()))
+        self._time_ns += self.spec.tick_ns
+        if self._failed:
+            self._measurement = self._measurement._replace(failed=True)
+        else:
+            self._sense()
+        return self.spec.tick_ns
+
+    def hold(self) -> None:
+        """Stay where it is, under torque."""
+        self._drives["q_wanted"] = self._drives["q_reference"]
+        self._drives["servo_wanted"] = self._drives["servo_reference"]
+        self._released = False
+
+    def release(self) -> None:
+        """The servos let go of the tendons and the segment springs straight; the arm's brakes hold.
+
+        :meth:`hold` takes hold again.
+        """
+        self._released = True
+
+    def close(self) -> None:
+        """There are no devices to give back."""
+
+    def change_board(self, board: Board) -> None:
+        """Put another board in front of the robot, which stays as it stands. Takes some 10 ms."""
+        positions = self._data.qpos[: self._bending].copy()
+        speeds = self._data.qvel[: self._bending].copy()
+        self._assemble(board)
+        self._data.qpos[: self._bending] = positions
+        self._data.qvel[: self._bending] = speeds
+        mujoco.mj_forward(self._model, self._data)
+        self._sense()
+
+    @property
+    def _bending(self) -> int:
+        """How many joints arm and segment have; a ball comes after them."""
+        return ARM_JOINTS + 2 * self._configuration.instrument.disk_count
+
+    def register_trocar(self, position: np.ndarray) -> None:
+        """The controller takes ``position`` (3,) m, base frame, for the trocar from now on.
+
+        Where the trocar truly is cannot be known from that: the true one is where the true shaft
+        passes nearest, if that is along the shaft, else where the true tip is, which touched it.
+        """
+        shaft = self._shaft_end - self._shaft_base
+        along = float((position - self._shaft_base) @ shaft) / float(shaft @ shaft)
+        if along < 1.0:
+            self._trocar_offset = self._shaft_base + along * shaft - position
+        else:
+            self._trocar_offset = self._tip - position
+
+    def truth(self, truth: np.ndarray) -> bool:
+        """Where the robot is, from the physics."""
+        t, bends = truth[0], self._physics.bend_positions
+        t["position"] = self._tip
+        quaternion_from_matrix(np.ascontiguousarray(self._tip_rotation), t["wxyz"])
+        t["shaft_base"], t["shaft_end"] = self._shaft_base, self._shaft_end
+        t["q"] = self._q
+        t["uv"] = self._data.qpos[bends].sum(axis=0)
+        t["trocar_position"] += self._trocar_offset
+        t["tension"] = self._tension
+        watch = self._watch
+        t["contact_count"], t["contact_force"] = watch.count, watch.force_n
+        t["rings_passed"], t["rings_touched"] = watch.passed, watch.touched
+        t["ball_position"], t["ball_progress"] = watch.ball_position, watch.ball_progress
+        return True
