@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from scenes.experiments import experiment
 from server.configuration_file import load
-from server.headless_run import HeadlessRun, RunOptions
+from server.headless_run import HeadlessRun
+from server.run_options import options_for
 
 
 def main() -> None:
     """Run a few ticks; every compiled function is then in the cache."""
     configuration = load()
-    path = experiment("circle", configuration).path
-    run = HeadlessRun(configuration, RunOptions("circle", path, "1", "hqp", "uv"))
+    run = HeadlessRun(
+        configuration, options_for(experiment("circle", configuration), configuration, "1")
+    )
     ticks = iter(range(3))
     run.execute(lambda _: None, lambda: next(ticks, None) is None)
 

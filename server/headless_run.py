@@ -1,24 +1,23 @@
-"""An experiment without a browser: the same loop, as fast as it goes, and the figures of it."""
+"""An experiment without a browser: the same loop, as fast as it goes or paced, and its trace."""
 
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
-from hardware.kinematic_plant import KinematicPlant
+from hardware.choose import make_plant
 from robot.configuration import Configuration
 from robot.instrument_robot import InstrumentRobot
-from robot.priority.levels import case_named
 from robot.priority.limits import describe, speed_violations, violations
 from robot.records import Request, Safety
 from robot.safety import REASONS, Event
 from robot.segment import polar
-from scenes.path import Path
-from server.control.loop import COORDINATE_NAMES, SOLVER_NAMES, ControlLoop
+from server.control.loop import ControlLoop
+from server.run_options import RunOptions, check_names
 
 TRACE_COLUMNS = (
     ["time_s"]
@@ -29,24 +28,15 @@ TRACE_COLUMNS = (
     + ["trocar_x_m", "trocar_y_m", "trocar_z_m"]
 )  # fmt: skip
 
+DETAIL_COLUMNS = (
+    *("residual_rcm_m_s", "residual_linear_m_s", "residual_angular_rad_s"),
+    *("contact_count", "contact_force_n", "rings_passed", "rings_touched", "ball_progress"),
+    *("commanded_qw", "commanded_qx", "commanded_qy", "commanded_qz"),
+    *("commanded_u_rad", "commanded_v_rad"),
+)
 
-@dataclass(frozen=True)
-class RunOptions:
-    """What to run.
-
-    Attributes:
-        experiment: its name, for the result.
-        path: what the tip shall do.
-        case: name of the priority case.
-        solver: name of the solver.
-        coordinates: name of the segment coordinates.
-    """
-
-    experiment: str
-    path: Path
-    case: str
-    solver: str
-    coordinates: str
+SETTLING_S = 0.5
+"""How long the plant stands before the trocar is registered and the robot enabled."""
 
 
 @dataclass
@@ -55,19 +45,40 @@ class RunResult:
 
     Attributes:
         trace: (steps, 28) rows with ``TRACE_COLUMNS``.
+        detail: (steps, 14) rows with ``DETAIL_COLUMNS``.
         errors: (steps, 3) position in m, orientation in rad, RCM in m, against the truth.
         tick_ns: (steps,) time of the controller's tick.
+        realtime_factor: plant time over wall time, controller and plant together.
         violations: ticks in which a limit was broken.
         limits: the limits that held the motion back, in words, with the share of ticks.
         ended: ``completed``, ``interrupted``, or the reason of the stop.
     """
 
     trace: np.ndarray
+    detail: np.ndarray
     errors: np.ndarray
     tick_ns: np.ndarray
+    realtime_factor: float = 0.0
     violations: int = 0
     limits: dict[str, float] = field(default_factory=dict)
     ended: str = "completed"
+
+
+class _Pace:
+    """Holds ticks to the wall clock; what was late is not caught up with."""
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        self._deadline = time.perf_counter()
+
+    def wait(self) -> None:
+        """Sleep until the next deadline."""
+        now = time.perf_counter()
+        self._deadline += self._period_s
+        if self._deadline > now:
+            time.sleep(self._deadline - now)
+        else:
+            self._deadline = now
 
 
 def _trace_row(record: np.void, time_s: float, out: np.ndarray) -> None:
@@ -78,130 +89,145 @@ def _trace_row(record: np.void, time_s: float, out: np.ndarray) -> None:
     out[10] = truth["lambda_along_shaft"]
     out[11:14], out[14:18] = truth["position"], truth["wxyz"]
     out[18:21], out[21:25] = report["desired_position"], report["desired_wxyz"]
-    out[25:28] = record["input"]["trocar_position"]
+    out[25:28] = truth["trocar_position"]
+
+
+def _detail_row(record: np.void, out: np.ndarray) -> None:
+    truth, report = record["truth"], record["outcome"]["report"]
+    out[0], out[1] = report["residual_rcm"], report["residual_linear"]
+    out[2] = report["residual_angular"]
+    out[3], out[4] = truth["contact_count"], truth["contact_force"]
+    out[5], out[6] = truth["rings_passed"], truth["rings_touched"]
+    out[7] = truth["ball_progress"]
+    out[8:12], out[12:14] = report["commanded_wxyz"], report["x"][7:9]
 
 
 class HeadlessRun:
-    """One run: robot, plant and loop, from the configuration's start."""
+    """One run: robot, plant and loop, from the configuration's start.
+
+    Attributes:
+        configuration: the one in force, with the options in it.
+        steps: ticks of the path.
+        dt_s: length of a tick.
+    """
 
     def __init__(self, configuration: Configuration, options: RunOptions) -> None:
-        """Build everything; raises the errors of configuration and names."""
-        self._options = options
+        """Build everything.
+
+        Args:
+            configuration: what the options leave open.
+            options: what to run.
+
+        Raises:
+            KeyholeError: a name is unknown, or the start cannot be reached.
+        """
+        check_names(options)
+        self.options = options
+        self.configuration = configuration = options.applied(configuration)
         self._robot = InstrumentRobot(configuration)
         x = self._robot.initial_state()["x"][0]
-        self._loop = ControlLoop(self._robot, KinematicPlant(configuration, x), configuration)
-        settings = self._loop.settings
-        settings["case"] = case_named(options.case)
-        settings["solver"] = SOLVER_NAMES[options.solver]
-        settings["coordinates"] = COORDINATE_NAMES[options.coordinates]
+        self._plant = make_plant(configuration, x)
+        self._loop = ControlLoop(self._robot, self._plant, configuration)
+        self._loop.settings["lock_arm"] = options.lock_arm
         self.steps = math.ceil(options.path.duration_s * configuration.control.rate_hz) + 1
         self.dt_s = 1.0 / configuration.control.rate_hz
 
     def execute(
-        self, progress: Callable[[float], None], interrupted: Callable[[], bool]
+        self,
+        progress: Callable[[float], None],
+        interrupted: Callable[[], bool],
+        record: Callable[[np.ndarray], None] | None = None,
     ) -> RunResult:
         """Run to the end, a stop, or an interruption; what was reached by then is returned.
 
         Args:
             progress: called now and then with the share done.
             interrupted: asked every tick whether to stop.
+            record: called after every tick, those before the path too, with the (1,)
+                ``robot.records.RECORD``, whose memory the next tick uses again.
         """
-        loop, record = self._loop, self._loop.record[0]
-        result = RunResult(
-            np.zeros((self.steps, len(TRACE_COLUMNS))),
-            np.zeros((self.steps, 3)),
-            np.zeros(self.steps, dtype=np.int64),
-        )
-        held_back: dict[str, int] = {}
+        try:
+            self._settle(record)
+            return self._play(progress, interrupted, record)
+        finally:
+            self._plant.close()
+
+    def _settle(self, record: Callable[[np.ndarray], None] | None) -> None:
+        """Let the plant come to rest under its weight, register the trocar, and enable."""
+        loop = self._loop
         loop.hold = 1  # a run has nobody who could keep the hold-to-move key down
+        for _ in range(round(SETTLING_S / self.dt_s)):
+            loop.step()
+            if record is not None:
+                record(loop.record)
+        self._plant.register_trocar(loop.trocar_position)
         loop.request = Request.ENABLE
         loop.step()
-        loop.start_path(self._options.path)
-        done = 0
+        if record is not None:
+            record(loop.record)
+
+    def _play(
+        self,
+        progress: Callable[[float], None],
+        interrupted: Callable[[], bool],
+        record: Callable[[np.ndarray], None] | None,
+    ) -> RunResult:
+        loop = self._loop
+        result = self._empty()
+        held_back: dict[str, int] = {}
+        pace = _Pace(self.dt_s) if self.options.realtime else None
+        loop.start_path(self.options.path)
+        done, started = 0, time.perf_counter()
         while loop.path is not None and done < self.steps:
             loop.step()
-            state, report = record["outcome"]["state"], record["outcome"]["report"]
+            if record is not None:
+                record(loop.record)
+            state = loop.record["outcome"]["state"][0]
             if state["safety"] != Safety.ENABLED:
                 result.ended = REASONS[Event(int(state["reason"]))][0]
                 break
-            _trace_row(record, done * self.dt_s, result.trace[done])
-            truth = record["truth"]
-            result.errors[done] = (
-                truth["position_error"],
-                truth["orientation_error"],
-                truth["rcm_error"],
-            )
-            result.tick_ns[done] = record["header"]["tick_ns"]
-            result.violations += self._breaks_a_limit(truth, report["x_dot"])
-            for words in describe(
-                int(report["limits_active"]), report["x"], self._robot.parameters
-            ):
-                held_back[words] = held_back.get(words, 0) + 1
+            self._take_down(done, result, held_back)
             done += 1
-            if done % 500 == 0:
+            if done % 100 == 0:
                 progress(done / self.steps)
             if interrupted():
                 result.ended = "interrupted"
                 break
+            if pace is not None:
+                pace.wait()
+        result.realtime_factor = done * self.dt_s / (time.perf_counter() - started)
         result.trace, result.errors = result.trace[:done], result.errors[:done]
-        result.tick_ns = result.tick_ns[:done]
+        result.detail, result.tick_ns = result.detail[:done], result.tick_ns[:done]
         result.limits = {
             words: round(count / done, 4) for words, count in sorted(held_back.items())
         }
         return result
+
+    def _empty(self) -> RunResult:
+        return RunResult(
+            np.zeros((self.steps, len(TRACE_COLUMNS))),
+            np.zeros((self.steps, len(DETAIL_COLUMNS))),
+            np.zeros((self.steps, 3)),
+            np.zeros(self.steps, dtype=np.int64),
+        )
+
+    def _take_down(self, place: int, result: RunResult, held_back: dict[str, int]) -> None:
+        """Write the newest record into row ``place`` of the result."""
+        record = self._loop.record[0]
+        truth, report = record["truth"], record["outcome"]["report"]
+        _trace_row(record, place * self.dt_s, result.trace[place])
+        _detail_row(record, result.detail[place])
+        errors = truth["position_error"], truth["orientation_error"], truth["rcm_error"]
+        result.errors[place] = errors
+        result.tick_ns[place] = record["header"]["tick_ns"]
+        result.violations += self._breaks_a_limit(truth, report["x_dot"])
+        limits = int(report["limits_active"])
+        if limits:
+            for words in describe(limits, report["x"], self._robot.parameters):
+                held_back[words] = held_back.get(words, 0) + 1
 
     def _breaks_a_limit(self, truth: np.void, x_dot: np.ndarray) -> int:
         x = np.array([*truth["q"], *truth["uv"], truth["lambda_along_shaft"]])
         broken = violations(x, self._robot.parameters)
         broken += speed_violations(x_dot, self._robot.parameters)
         return int(broken > 0)
-
-
-def _summary(values: np.ndarray, factor: float) -> dict[str, float | None]:
-    if len(values) == 0:
-        return {"max": None, "rms": None, "final": None}
-    return {
-        "max": float(values.max() * factor),
-        "rms": float(np.sqrt(np.mean(values**2)) * factor),
-        "final": float(values[-1] * factor),
-    }
-
-
-def result_document(
-    configuration: Configuration, options: RunOptions, result: RunResult, plant: str
-) -> dict[str, Any]:
-    """The run's figures as a JSON document; lengths in mm, angles in degrees, times as named."""
-    steps = len(result.trace)
-    reference = configuration.priority.lambda_reference
-    dt_s = 1.0 / configuration.control.rate_hz
-    bend = np.degrees(0.5 * math.pi - result.trace[:, 8])
-    lambdas = np.abs(result.trace[:, 10] - reference)
-    ticks = result.tick_ns * 1e-3
-    degrees = 180.0 / math.pi
-    return {
-        "experiment": options.experiment,
-        "case": options.case,
-        "solver": options.solver,
-        "coordinates": options.coordinates,
-        "plant": plant,
-        "steps": steps,
-        "dt_s": dt_s,
-        "duration_s": float(result.trace[-1, 0]) if steps else 0.0,
-        "ended": result.ended,
-        "errors": {
-            "position_mm": _summary(result.errors[:, 0], 1e3),
-            "orientation_deg": _summary(result.errors[:, 1], degrees),
-            "rcm_mm": _summary(result.errors[:, 2], 1e3),
-        },
-        "lambda": {
-            "reference": reference,
-            "max_abs_error": float(lambdas.max()) if steps else None,
-        },
-        "bend_deg": {"max": float(bend.max()) if steps else None},
-        "limits": {"violations": result.violations, "held_back": result.limits},
-        "tick_us": {
-            "p50": float(np.percentile(ticks, 50)) if steps else None,
-            "p99": float(np.percentile(ticks, 99)) if steps else None,
-        },
-        "configuration_hash": f"{configuration.hash64():016x}",
-    }

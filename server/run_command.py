@@ -1,30 +1,37 @@
-"""``keyhole run``: an experiment or path file, headless; figures as JSON, a trace as CSV."""
+"""``keyhole run``: experiments or a path file, headless; figures as JSON, a trace as CSV."""
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
-import signal
-import sys
 from pathlib import Path
 from typing import Any
 
 from robot.configuration import Configuration
 from robot.errors import KeyholeError
 from robot.priority.levels import CASE_NAMES
+from scenes.boards.board import BOARD_NAMES
 from scenes.experiments import experiment, names
 from scenes.path_file import parse_csv
 from server.configuration_file import load
 from server.control.loop import COORDINATE_NAMES, SOLVER_NAMES
-from server.headless_run import (
-    TRACE_COLUMNS,
-    HeadlessRun,
+from server.figure_table import printed
+from server.headless_run import TRACE_COLUMNS, HeadlessRun, RunResult
+from server.progress_bar import ProgressBar
+from server.run_figures import result_document
+from server.run_options import (
+    COMPENSATIONS,
+    PLANTS,
+    PRESETS,
+    SEED_MAX,
     RunOptions,
-    RunResult,
-    result_document,
+    cut,
+    options_for,
 )
+from server.stop_signals import StopSignals
 
-_BAR_WIDTH = 30
+ALL = "all"
 
 
 class RunArgumentError(KeyholeError):
@@ -36,7 +43,7 @@ class RunArgumentError(KeyholeError):
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``run`` to the command line."""
     parser = subparsers.add_parser("run", help="run an experiment or a path without a browser")
-    parser.add_argument("name", nargs="?", help="name of the experiment (see --list)")
+    parser.add_argument("name", nargs="?", help=f"an experiment (see --list), or {ALL}")
     parser.add_argument("--path", metavar="FILE", help="play a CSV path instead of an experiment")
     parser.add_argument("--list", action="store_true", help="list the experiments and stop")
     parser.add_argument("--case", choices=tuple(CASE_NAMES), help="priority case")
@@ -44,62 +51,144 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--coordinates", choices=tuple(COORDINATE_NAMES), help="segment coordinates (closed forms)"
     )
-    parser.add_argument("--plant", choices=("kinematic",), default="kinematic", help="the robot")
+    add_robot_arguments(parser)
+    parser.add_argument("--board", choices=BOARD_NAMES, help="another board than the experiment's")
+    parser.add_argument(
+        "--seconds", type=positive, metavar="S", help="play only the first S seconds of the path"
+    )
+    parser.add_argument("--realtime", action="store_true", help="paced by the wall clock")
     parser.add_argument("--config", metavar="FILE", help="configuration (TOML)")
     parser.add_argument("--json", metavar="FILE", help="write the figures as JSON (- for stdout)")
     parser.add_argument("--trace", metavar="FILE", help="write a CSV with a row a tick")
+
+
+def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say how good the robot is, and what it knows of itself."""
+    parser.add_argument("--plant", choices=PLANTS, help="the robot: physics or exact kinematics")
+    parser.add_argument("--preset", choices=PRESETS, help="how good the simulated robot is")
+    parser.add_argument("--seed", type=seed, metavar="N", help="which robot of that preset")
+    parser.add_argument("--tracker", choices=("on", "off"), help="whether the tip is tracked")
+    parser.add_argument(
+        "--compensation", choices=COMPENSATIONS, help="of the tendons' stretch and friction"
+    )
+
+
+def seed(text: str) -> int:
+    """A seed from the command line; raises ``argparse.ArgumentTypeError`` for what is none."""
+    if not text.isascii() or not text.isdigit() or int(text) > SEED_MAX:
+        raise argparse.ArgumentTypeError(
+            f"a seed is a whole number from 0 to {SEED_MAX}, not {text!r}"
+        )
+    return int(text)
+
+
+def positive(text: str) -> float:
+    """A number above zero from the command line."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"must be a number above 0, not {text!r}")
+    return value
 
 
 def execute(arguments: argparse.Namespace) -> int:
     """Run it.
 
     Returns:
-        0 when the path was played to its end, 1 when it was stopped before.
+        0 when every path was played to its end, 1 when one was stopped before.
     """
     configuration = load(arguments.config)
     if arguments.list:
         _print_list(configuration)
         return 0
-    options = _options(arguments, configuration)
+    many = arguments.name == ALL and arguments.path is None
+    runs = _all(arguments, configuration) if many else [_one(arguments, configuration)]
     _check_writable(arguments.json)
     _check_writable(arguments.trace)
-    progress = _bar if sys.stderr.isatty() else _no_bar
-    with _StopSignals() as stopped:
-        result = HeadlessRun(configuration, options).execute(progress, stopped.received)
-    if progress is _bar:
-        print(file=sys.stderr)
-    document = result_document(configuration, options, result, arguments.plant)
-    if arguments.trace:
-        _write_trace(arguments.trace, result)
-    if arguments.json == "-":
-        print(json.dumps(document, indent=2))
+    documents: list[dict[str, Any]] = []
+    with StopSignals() as stopped:
+        for place, options in enumerate(runs, 1):
+            title = options.experiment + (f", case {options.case} ({place}/{len(runs)})" * many)
+            run = HeadlessRun(configuration, options)
+            bar = ProgressBar(title)
+            result = run.execute(bar, stopped.received)
+            bar.end()
+            documents.append(result_document(run.configuration, options, result))
+            if arguments.trace:
+                _write_trace(arguments.trace, result)
+            if stopped.received():
+                break
+    _tell(documents if many else documents[0], arguments.json)
+    return 0 if all(document["ended"] == "completed" for document in documents) else 1
+
+
+def _tell(found: dict[str, Any] | list[dict[str, Any]], file: str | None) -> None:
+    text = json.dumps(found, indent=2)
+    if file == "-":
+        print(text)
+        return
+    if file:
+        Path(file).write_text(text + "\n")
+    if isinstance(found, list):
+        print(printed(found))
     else:
-        if arguments.json:
-            Path(arguments.json).write_text(json.dumps(document, indent=2) + "\n")
-        _print_summary(document)
-    return 0 if result.ended == "completed" else 1
+        _print_summary(found)
 
 
-def _options(arguments: argparse.Namespace, configuration: Configuration) -> RunOptions:
+def _choices(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The fields of ``RunOptions`` that the command line sets."""
+    chosen = {
+        "plant": arguments.plant,
+        "preset": arguments.preset,
+        "seed": arguments.seed,
+        "tracker": None if arguments.tracker is None else arguments.tracker == "on",
+        "compensation": arguments.compensation,
+        "realtime": arguments.realtime,
+    }
+    for name in ("solver", "coordinates", "board"):
+        if getattr(arguments, name) is not None:
+            chosen[name] = getattr(arguments, name)
+    return chosen
+
+
+def _one(arguments: argparse.Namespace, configuration: Configuration) -> RunOptions:
+    """The one run that is asked for."""
     if (arguments.name is None) == (arguments.path is None):
         raise RunArgumentError("give either the name of an experiment or --path FILE")
     priority = configuration.priority
-    if arguments.path is not None:
+    case, choices = arguments.case or priority.case, _choices(arguments)
+    if arguments.path is None:
+        options = options_for(
+            experiment(arguments.name, configuration), configuration, case, **choices
+        )
+    else:
         try:
             text = Path(arguments.path).read_text()
         except (OSError, UnicodeDecodeError) as error:
             reason = error.strerror if isinstance(error, OSError) else "is not text (UTF-8)"
             raise RunArgumentError(f"{arguments.path}: {reason}") from None
-        name, path = Path(arguments.path).name, parse_csv(text, arguments.path)
-    else:
-        name, path = arguments.name, experiment(arguments.name, configuration).path
-    return RunOptions(
-        name,
-        path,
-        arguments.case or priority.case,
-        arguments.solver or priority.solver,
-        arguments.coordinates or priority.coordinates,
-    )
+        fields = {"solver": priority.solver, "coordinates": priority.coordinates} | choices
+        name = Path(arguments.path).name
+        options = RunOptions(name, parse_csv(text, arguments.path), case, **fields)
+    return dataclasses.replace(options, path=cut(options.path, arguments.seconds))
+
+
+def _all(arguments: argparse.Namespace, configuration: Configuration) -> list[RunOptions]:
+    """Every experiment for every case it lists, or for the one that is asked for."""
+    if arguments.trace:
+        raise RunArgumentError(f"--trace is of one run; name an experiment instead of {ALL!r}")
+    runs = []
+    for name in names():
+        found = experiment(name, configuration)
+        cases = (arguments.case,) if arguments.case else found.cases
+        path = cut(found.path, arguments.seconds)
+        runs += [
+            options_for(found, configuration, case, **(_choices(arguments) | {"path": path}))
+            for case in cases
+        ]
+    return runs
 
 
 def _check_writable(name: str | None) -> None:
@@ -111,44 +200,6 @@ def _check_writable(name: str | None) -> None:
             pass
     except OSError as error:
         raise RunArgumentError(f"{name} cannot be written: {error.strerror}") from None
-
-
-class _StopSignals:
-    """Turns the first SIGINT or SIGTERM into a question the run can ask; a second one ends it."""
-
-    def __init__(self) -> None:
-        self._received = False
-        self._before: dict[int, Any] = {}
-
-    def __enter__(self) -> _StopSignals:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            self._before[number] = signal.signal(number, self._receive)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
-
-    def _receive(self, *_: object) -> None:
-        self._received = True
-        self.__exit__()
-
-    def received(self) -> bool:
-        return self._received
-
-
-def _bar(share: float) -> None:
-    filled = round(share * _BAR_WIDTH)
-    print(
-        f"\r[{'#' * filled}{'.' * (_BAR_WIDTH - filled)}] {100 * share:3.0f} %",
-        end="",
-        file=sys.stderr,
-        flush=True,
-    )
-
-
-def _no_bar(share: float) -> None:
-    """Where nobody looks, no bar is drawn."""
 
 
 def _write_trace(name: str, result: RunResult) -> None:
@@ -163,21 +214,41 @@ def _print_list(configuration: Configuration) -> None:
         print(f"{name:<20} {one.duration_s:6.1f} s   {one.title}")
 
 
-def _print_summary(document: dict[str, object]) -> None:
-    errors = document["errors"]
-    assert isinstance(errors, dict)
+def _print_summary(document: dict[str, Any]) -> None:
     print(
         f"{document['experiment']}: case {document['case']}, {document['solver']}, "
         f"{document['plant']} plant, {document['steps']} ticks: {document['ended']}"
     )
+    if document["plant"] != "kinematic":
+        print(
+            f"  preset {document['preset']}, seed {document['seed']}, "
+            f"tracker {'on' if document['tracker'] else 'off'}, "
+            f"compensation {document['compensation']}"
+        )
     for key, unit in (("position_mm", "mm"), ("orientation_deg", "deg"), ("rcm_mm", "mm")):
-        values = errors[key]
-        if values["max"] is not None:
-            print(
-                f"  {key.split('_')[0]:<12} max {values['max']:10.5f} {unit}   "
-                f"rms {values['rms']:10.5f} {unit}   final {values['final']:10.5f} {unit}"
-            )
-    limits = document["limits"]
-    assert isinstance(limits, dict)
-    for words, share in limits["held_back"].items():
+        _print_extremes(key.split("_")[0], unit, document["errors"][key])
+    for key in ("theta_deg", "direction_deg"):
+        if "bend" in document:
+            _print_extremes(key.split("_")[0], "deg", document["bend"][key])
+    if document["contact"]["count"]:
+        contact = document["contact"]
+        print(f"  contacts     {contact['count']}, at most {contact['max_force_n']:.3f} N")
+    if document["rings"]["count"]:
+        rings = document["rings"]
+        print(
+            f"  rings        {rings['passed']} of {rings['count']} passed, "
+            f"{rings['touched']} touched"
+        )
+    if document["board"].startswith("silicon"):
+        print(f"  ball         {100 * document['ball']['progress']:.1f} % of the groove")
+    for words, share in document["limits"]["held_back"].items():
         print(f"  held back {100 * share:.1f} % of the time: {words}")
+    print(f"  {document['realtime_factor']:.1f} times real time")
+
+
+def _print_extremes(name: str, unit: str, values: dict[str, float | None]) -> None:
+    if values["max"] is None:
+        return
+    final = values.get("final")
+    line = f"  {name:<12} max {values['max']:10.5f} {unit}   rms {values['rms']:10.5f} {unit}"
+    print(line + (f"   final {final:10.5f} {unit}" if final is not None else ""))

@@ -15,7 +15,9 @@ from scenes.experiments import experiment
 from scenes.path import Path
 from scenes.static_optimum import StaticOptimum
 from server.configuration_file import load
-from server.headless_run import TRACE_COLUMNS, HeadlessRun, RunOptions, RunResult, result_document
+from server.headless_run import TRACE_COLUMNS, HeadlessRun, RunResult
+from server.run_figures import result_document
+from server.run_options import RunOptions
 from tests import own_kinematics
 
 
@@ -77,9 +79,10 @@ def play(
 ) -> Run:
     """Run a path."""
     chosen = under or configuration()
-    options = RunOptions(path.name, path, case, solver, coordinates)
-    result = HeadlessRun(chosen, options).execute(lambda _: None, lambda: False)
-    return Run(result, result_document(chosen, options, result, "kinematic"))
+    options = RunOptions(path.name, path, case, solver, coordinates, plant="kinematic")
+    run = HeadlessRun(chosen, options)
+    result = run.execute(lambda _: None, lambda: False)
+    return Run(result, result_document(run.configuration, options, result))
 
 
 @functools.cache

@@ -20,7 +20,7 @@ from hardware.plant import Measurement
 from scenes.experiments import names
 from server import headless_run
 from server.command_line import main
-from server.headless_run import TRACE_COLUMNS
+from server.headless_run import SETTLING_S, TRACE_COLUMNS
 from server.supervision.child_process import module_command, module_environment
 from tests import own_kinematics
 from tests.server import headless
@@ -37,6 +37,12 @@ KEYS = {
     "dt_s": float,
     "duration_s": float,
     "ended": str,
+    "preset": str,
+    "seed": int,
+    "board": str,
+    "tracker": bool,
+    "compensation": str,
+    "realtime_factor": float,
 }
 
 
@@ -56,7 +62,7 @@ def lines(file: Path) -> list[list[str]]:
 def test_the_json_holds_what_programs_rely_on(
     short: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["run", "--path", short, "--case", "2", "--json", "-"]) == 0
+    assert main(["run", "--plant", "kinematic", "--path", short, "--case", "2", "--json", "-"]) == 0
     output = capsys.readouterr()
     document: dict[str, Any] = json.loads(output.out)
     assert output.err == ""
@@ -82,7 +88,7 @@ def test_anyone_can_recompute_the_errors_from_the_trace(
 ) -> None:
     """By DH, quaternions and vector algebra that the program does not use."""
     figures, trace = tmp_path / "figures.json", tmp_path / "trace.csv"
-    command = ["run", "circle-infeasible", "--case", "0"]
+    command = ["run", "circle-infeasible", "--case", "0", "--plant", "kinematic"]
     assert main([*command, "--json", str(figures), "--trace", str(trace)]) == 0
     summary = capsys.readouterr().out
     document = json.loads(figures.read_text())
@@ -112,7 +118,7 @@ def test_the_trace_s_true_pose_trocar_and_lambda_are_those_of_its_joints(
     tmp_path: Path, short: str
 ) -> None:
     trace = tmp_path / "trace.csv"
-    assert main(["run", "--path", short, "--trace", str(trace)]) == 0
+    assert main(["run", "--plant", "kinematic", "--path", short, "--trace", str(trace)]) == 0
     for row in np.array(lines(trace)[1:], dtype=float)[::20]:
         where = own_kinematics.pose(headless.configuration(), row[1:8], row[8], row[9])
         np.testing.assert_allclose(row[11:14], where.tip, rtol=0, atol=1e-12)
@@ -128,7 +134,7 @@ def test_a_path_moves_along_the_base_s_axes_and_turns_in_the_base(
     tmp_path: Path, short: str
 ) -> None:
     trace = tmp_path / "trace.csv"
-    assert main(["run", "--path", short, "--trace", str(trace)]) == 0
+    assert main(["run", "--plant", "kinematic", "--path", short, "--trace", str(trace)]) == 0
     values = np.array(lines(trace)[1:], dtype=float)
     first, middle = values[0], values[250]
     np.testing.assert_allclose(middle[18:21] - first[18:21], [0.002, 0.001, 0.0], atol=1e-12)
@@ -140,7 +146,7 @@ def test_a_path_moves_along_the_base_s_axes_and_turns_in_the_base(
 def test_equal_runs_leave_equal_traces(tmp_path: Path, short: str) -> None:
     traces = [tmp_path / "one.csv", tmp_path / "two.csv"]
     for trace in traces:
-        assert main(["run", "--path", short, "--trace", str(trace)]) == 0
+        assert main(["run", "--plant", "kinematic", "--path", short, "--trace", str(trace)]) == 0
     assert traces[0].read_bytes() == traces[1].read_bytes()
 
 
@@ -157,7 +163,17 @@ def test_a_run_that_is_stopped_still_writes_its_json(
     long = tmp_path / "long.csv"
     long.write_text(HEAD + "0,0,0,0,1,0,0,0\n900,10,0,0,1,0,0,0\n")
     figures, trace = tmp_path / "figures.json", tmp_path / "trace.csv"
-    arguments = ["run", "--path", str(long), "--json", str(figures), "--trace", str(trace)]
+    arguments = [
+        "run",
+        "--plant",
+        "kinematic",
+        "--path",
+        str(long),
+        "--json",
+        str(figures),
+        "--trace",
+        str(trace),
+    ]
     process = subprocess.Popen(
         module_command("server.command_line", arguments),
         env=module_environment(),
@@ -186,22 +202,24 @@ def test_a_run_that_is_stopped_still_writes_its_json(
 
 def test_a_run_leaves_the_signals_as_they_were(short: str) -> None:
     before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
-    assert main(["run", "--path", short]) == 0
+    assert main(["run", "--plant", "kinematic", "--path", short]) == 0
     assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
 
 
 def test_a_fault_ends_the_run_with_its_reason(
     short: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    settling = round(500 * SETTLING_S)
+
     class Failing(KinematicPlant):
         reads = 0
 
         def read(self) -> Measurement:
             Failing.reads += 1
-            return super().read()._replace(valid=Failing.reads < 100)
+            return super().read()._replace(valid=Failing.reads < settling + 100)
 
-    monkeypatch.setattr(headless_run, "KinematicPlant", Failing)
-    assert main(["run", "--path", short, "--json", "-"]) == 1
+    monkeypatch.setattr(headless_run, "make_plant", Failing)
+    assert main(["run", "--plant", "kinematic", "--path", short, "--json", "-"]) == 1
     document = json.loads(capsys.readouterr().out)
     assert document["ended"] == "measurements from the robot stopped"
     assert 50 < document["steps"] < 100
@@ -243,11 +261,20 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     [
         (["run"], "name of an experiment or --path"),
         (["run", "circle", "--path", "x.csv"], "name of an experiment or --path"),
-        (["run", "spiral"], "choose one of: circle, circle-yz, square, circle-infeasible"),
+        (["run", "spiral"], "choose one of: arc, arc-stylus, circle, circle-yz"),
         (["run", "circle", "--case", "3"], "invalid choice: '3'"),
         (["run", "circle", "--solver", "magic"], "invalid choice: 'magic'"),
         (["run", "circle", "--coordinates", "xy"], "invalid choice: 'xy'"),
         (["run", "circle", "--plant", "steam"], "invalid choice: 'steam'"),
+        (["run", "circle", "--preset", "shiny"], "invalid choice: 'shiny'"),
+        (["run", "circle", "--compensation", "half"], "invalid choice: 'half'"),
+        (["run", "circle", "--tracker", "maybe"], "invalid choice: 'maybe'"),
+        (["run", "circle", "--board", "chess"], "invalid choice: 'chess'"),
+        (["run", "circle", "--seed", "-1"], "a seed is a whole number from 0"),
+        (["run", "circle", "--seed", "1.5"], "a seed is a whole number from 0"),
+        (["run", "circle", "--seed", "9999999999"], "a seed is a whole number from 0"),
+        (["run", "circle", "--seconds", "nan"], "must be a number above 0"),
+        (["run", "all", "--trace", "x.csv"], "--trace is of one run"),
         (["run", "circle", "twice"], "unrecognized arguments"),
         (["run", "--path", "no/such/file.csv"], "no/such/file.csv: No such file"),
         (["run", "--path", "/"], "/: Is a directory"),
