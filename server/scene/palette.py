@@ -22,6 +22,13 @@ DISK: Colour = (112, 118, 130)
 PORT: Colour = (54, 64, 80)
 WALL: Colour = (206, 108, 88)
 RCM: Colour = (214, 40, 90)
+BALL: Colour = (236, 186, 30)
+GROOVE: Colour = (122, 78, 62)
+PEDESTAL: Colour = (120, 126, 138)
+TOUCHED: Colour = (255, 70, 10)
+"""What the instrument touches."""
+PASSED: Colour = (22, 176, 58)
+"""A ring that the tip has gone half-way through."""
 PLINTH: Colour = (136, 142, 152)
 GRID_CELL: Colour = (150, 155, 165)
 GRID_SECTION: Colour = (122, 128, 140)

@@ -24,6 +24,8 @@ from robot.records import Safety
 from robot.rotations import angle_between, matrix_from_quaternion
 from robot.segment import tip_rotation
 from robot.urdf import FLANGE
+from scenes.boards.board import BOARD_NAMES, board
+from server.scene.board import SceneBoard
 from server.scene.camera import SceneCamera
 from server.scene.frames import SceneFrames
 from server.scene.ghost import SceneGhost
@@ -39,6 +41,8 @@ from server.scene.trocar import SceneTrocar
 PERIOD = 1.0 / 30.0
 UNWATCHED_PERIOD = 1.0
 """Between two pictures while no browser is connected, s: the next one starts nearly right."""
+BOARD_PERIOD = 0.5
+"""Between two looks at which board is there, s."""
 
 log = logging.getLogger(__name__)
 
@@ -48,6 +52,9 @@ class SceneLink(GizmoLink, Protocol):
 
     def snapshot(self) -> NDArray[Any]:
         """The newest record, shape (1,), :data:`robot.records.RECORD`."""
+
+    def status(self) -> dict[str, Any]:
+        """What changes rarely; only ``board`` is used here, the name of the one that is there."""
 
 
 class SceneView:
@@ -74,8 +81,7 @@ class SceneView:
         """
         if model_directory is None:
             model_directory = ensure_model(configuration, cache_directory().parent)
-        self._server = server
-        self._link = link
+        self._server, self._link, self._configuration = server, link, configuration
         trocar = np.array(configuration.trocar.position_m)
         inward = np.array(configuration.start.shaft_direction)
         inward /= np.linalg.norm(inward)
@@ -87,6 +93,8 @@ class SceneView:
             self._robot = SceneRobot(server, model_directory, joints)
             self._segment = SceneSegment(server, configuration.instrument)
             self._trocar = SceneTrocar(server, configuration)
+            self.board = SceneBoard(server, configuration.instrument)
+            self.board.show(board(configuration.simulation.board, configuration))
             self._trails = SceneTrails(server)
             self._ghost = SceneGhost(server, configuration.instrument)
             self._frames = SceneFrames(server, self._robot.paths[FLANGE], TROCAR)
@@ -97,7 +105,7 @@ class SceneView:
             ScenePanel(server, self._camera, self._frames, self._trails, self._trocar, self._ground)
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
-        self._drawn = -np.inf
+        self._drawn = self._looked = -np.inf
         self._failed = False
 
     def start(self) -> None:
@@ -148,8 +156,18 @@ class SceneView:
         if not watched and now - self._drawn < UNWATCHED_PERIOD:
             return
         self._drawn = now
+        self._find_board(now)
         with self._server.atomic():
             self._draw(now, record)
+
+    def _find_board(self, now: float) -> None:
+        """Show the board that the robot has before it, when it has changed."""
+        if now - self._looked < BOARD_PERIOD:
+            return
+        self._looked = now
+        name = self._link.status()["board"]
+        if name != self.board.name and name in BOARD_NAMES:
+            self.board.show(board(name, self._configuration))
 
     def _draw(self, now: float, record: Any) -> None:
         truth, report = record["truth"], record["outcome"]["report"]
@@ -162,6 +180,7 @@ class SceneView:
         inward = inward / np.linalg.norm(inward)
         self._robot.update(truth["q"])
         self._segment.update(truth["shaft_end"], tip @ bend.T, truth["uv"])
+        self.board.update(now, truth, tip @ bend.T)
         self._trocar.update(trocar, -inward)
         self._frames.update(truth["position"], truth["wxyz"])
         self._camera.update(trocar, truth["position"], inward)

@@ -42,6 +42,7 @@ class Recorder:
         self.record["header"]["tick"] = 1
         self.record["input"]["trocar_position"] = configuration.trocar.position_m
         self.record["outcome"]["state"]["safety"] = Safety.ENABLED
+        self.board = configuration.simulation.board
         self.samples: list[Sample] = []
         self.failures = 0
         self.reads = 0
@@ -63,6 +64,9 @@ class Recorder:
             self.failures -= 1
             raise MappedReadError(Path("record"), "torn")
         return self.record
+
+    def status(self) -> dict[str, Any]:
+        return {"board": self.board}
 
     def leader(
         self,
