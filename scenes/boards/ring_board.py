@@ -32,7 +32,7 @@ _WIRE_RADIUS = 0.0006
 _POST_RADIUS = 0.0009
 _PLATE_DEPTH = 0.034
 """Of the plate's upper face below the tip at the start, m."""
-_WIRE: Colour = (228, 228, 232)
+_WIRE: Colour = (70, 78, 96)
 _POST: Colour = (120, 126, 138)
 _PLATE: Colour = (64, 72, 88)
 

@@ -84,7 +84,7 @@ class SceneBoard:
                     f"{ROOT}/ring {number} label",
                     str(number),
                     position=ring.centre + np.array([0.0, 0.0, ring.clear_radius + 0.004]),
-                    font_screen_scale=0.7,
+                    font_screen_scale=0.9,
                     anchor="bottom-center",
                 )
                 for number, ring in enumerate(board.rings, 1)

@@ -16,8 +16,8 @@ UP = (0.0, 0.0, 1.0)
 HOME_STEP = 0.02
 """The first view is set anew when tip or trocar moved by more than this, m."""
 
-OVERVIEW, INSTRUMENT, ALONG = "Overview", "Instrument", "Along the shaft"
-NAMES = (OVERVIEW, INSTRUMENT, ALONG)
+OVERVIEW, INSTRUMENT, BOARD, ALONG = "Overview", "Instrument", "Board", "Along the shaft"
+NAMES = (OVERVIEW, INSTRUMENT, BOARD, ALONG)
 
 
 class View(NamedTuple):
@@ -53,7 +53,9 @@ def named_view(
         # Below the wall, as an endoscope through a second port would see it.
         look_at = tip + 0.02 * inward
         return View(trocar + 0.012 * inward + 0.06 * sideways - 0.006 * up, look_at)
-
+    if name == BOARD:
+        look_at = tip + 0.015 * forward - 0.008 * up
+        return View(look_at + 0.11 * sideways + 0.10 * forward + 0.09 * up, look_at)
     look_at = 0.55 * trocar + 0.45 * tip
     return View(look_at + 0.37 * sideways + 0.36 * forward + 0.17 * up, look_at)
 
