@@ -12,7 +12,7 @@ PEG_DISTANCE = 0.023
 """Between one peg and the next, m (paper, section 5.3)."""
 CORNERS = PEG_DISTANCE * np.array([[0, 0], [-1, 0], [-1, 1], [0, 1]], dtype=float)
 """(4, 2) x and y of the pegs from the tip at the start, base frame, m, as they are visited."""
-CLEARANCE = 0.004
+CLEARANCE = 0.0045
 """From the tops of the pegs to the instrument as it passes over them at the start's height, m."""
 
 _COLOURS = {
@@ -21,7 +21,7 @@ _COLOURS = {
     "blue": (38, 92, 190),
     "yellow": (214, 170, 16),
 }
-_PEG_RADIUS = 0.003
+_PEG_RADIUS = 0.0022
 _PEG_HEIGHT = 0.022
 _PLATE = (205, 208, 214)
 

@@ -35,7 +35,10 @@ _RAIL_HEIGHT = 0.0022
 _PLAY = 0.0002
 """Of the ball between the rails, to either side, m."""
 _RAIL_PIECE = 0.0025
-_LEAD_IN = 0.004
+_LEAD_IN = 0.0025
+_BORDER = np.array([[-0.0045, -0.014], [0.016, 0.014]])
+"""Of the board around the centre line, m: near the start it ends short of where the segment passes
+when it straightens."""
 _POINTS = 201
 _SILICON: Colour = (226, 196, 178)
 _RAIL: Colour = (176, 120, 100)
@@ -135,10 +138,9 @@ def silicon(name: str, title: str, configuration: Configuration) -> Board:
     start = groove_start(name, here)
     points, _ = LINES[name](np.linspace(0.0, 1.0, _POINTS))
     level = np.column_stack([points, np.zeros(_POINTS)])
-    low, high = points.min(axis=0), points.max(axis=0)
-    margin = np.array([0.016, 0.014])
+    low, high = np.array([points.min(axis=0), points.max(axis=0)]) + _BORDER
     middle = np.array([*(0.5 * (low + high)), -BALL_RADIUS])
-    half = 0.5 * (high - low) + margin
+    half = 0.5 * (high - low)
     floor = plate(
         "floor",
         start + here.heading @ middle,
