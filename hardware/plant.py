@@ -85,10 +85,13 @@ class Plant(Protocol):
         """
 
     def register_trocar(self, position: np.ndarray) -> None:
-        """The controller takes the trocar to rest at ``position`` (3,), base frame, m, from now on.
+        """The trocar is registered now, by the shaft or the tip standing there.
 
-        A plant whose kinematics differ from the controller's notes where that truly is, for
-        :meth:`truth`.
+        A plant whose kinematics differ from the controller's notes by how much, for :meth:`truth`.
+
+        Args:
+            position: (3,) point of the shaft's axis nearest to the trocar, or the tip where it
+                touched, as the controller knows it; base frame, m.
         """
 
     def truth(self, truth: np.ndarray) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from robot.arm import Arm
+from robot.calibration import Calibration
 from robot.configuration import Configuration
 from robot.instrument_tick import (
     SOLVE_CLOSED_FORM,
@@ -17,6 +18,7 @@ from robot.instrument_tick import (
     copy_joints,
     decide_and_prepare,
     integrate,
+    wake,
 )
 from robot.parameters import parameters
 from robot.priority.closed_form import augmented, polar_columns, prioritized
@@ -66,15 +68,24 @@ class InstrumentRobot:
 
     Attributes:
         configuration: what it was built from.
+        calibration: of its tendons.
         parameters: (1,) the same, compiled.
     """
 
     name = "instrument"
 
-    def __init__(self, configuration: Configuration) -> None:
-        """Build the models and find the start; raises ``UnreachableStart``."""
+    def __init__(
+        self, configuration: Configuration, calibration: Calibration | None = None
+    ) -> None:
+        """Build the models and find the start; raises ``UnreachableStart``.
+
+        Args:
+            configuration: describes the robot.
+            calibration: of its tendons; without one they are taken as ideal.
+        """
         self.configuration = configuration
-        self.parameters = parameters(configuration)
+        self.calibration = calibration or Calibration()
+        self.parameters = parameters(configuration, calibration)
         self._arm = Arm(urdf_text(configuration))
         self._work = _Work()
         length = configuration.priority.characteristic_length_m
@@ -92,6 +103,7 @@ class InstrumentRobot:
         outcome["state"]["x"] = self._start if x is None else x
         tick_input["trocar_position"] = self.configuration.trocar.position_m
         self._conclude(outcome, tick_input)
+        wake(outcome, self.parameters)
         return np.asarray(outcome["state"].copy())
 
     def tick(self, state: np.ndarray, tick_input: np.ndarray, outcome: np.ndarray) -> None:

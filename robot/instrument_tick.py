@@ -7,15 +7,17 @@ import math
 import numpy as np
 
 from robot.commands import tip_twist
+from robot.compensation import SHARE_RATE, commanded_bend, follow_friction, follow_setting
 from robot.compiled import compiled
 from robot.instrument import project_on_shaft, rcm_jacobian, shaft, tip, tip_jacobian
 from robot.priority.levels import assemble
-from robot.priority.limits import active_limits, rate_limits
+from robot.priority.limits import active_limits, lock_arm, rate_limits
 from robot.priority.meet_all import meet_all
 from robot.records import Case, LeaderKind, Safety, Solver
 from robot.rotations import angle_between, quaternion_from_matrix
 from robot.safety import Event, apply_event, decide
 from robot.segment import polar
+from robot.sensing.tip_correction import aim, correct, expected_tip, follow_tip, start_correction
 from robot.teleoperation import follow
 from robot.tendons import servo_angles
 
@@ -133,9 +135,11 @@ def _tasks(
     base, end, rotation = np.empty(3), np.empty(3), np.empty((3, 3))
     shaft(s.arm_position, s.arm_rotation, parameters, base, end, rotation)
     _rcm_rows(outcome, tick_input, parameters, base, end, catalogue, targets)
+    position, turned = np.empty(3), np.empty((3, 3))
+    aim(s, s.desired_position, s.desired_rotation, position, turned)
     tip_twist(
-        s.desired_position,
-        s.desired_rotation,
+        position,
+        turned,
         previous_position,
         previous_rotation,
         s.tip_position,
@@ -193,9 +197,12 @@ def integrate(
     report.residual_rcm = math.sqrt(residual[0])
     report.residual_linear = math.sqrt(residual[1])
     report.residual_angular = math.sqrt(residual[2])
+    u, v = s.x[7], s.x[8]
     for k in range(10):
         report.x_dot[k] = rates[k]
         s.x[k] += dt * rates[k]
+    follow_friction(s, u, v, parameters)
+    follow_setting(s, tick_input[0].settings.compensation, SHARE_RATE * dt)
     outcome[0].command.moving = 1
 
 
@@ -234,6 +241,8 @@ def _levels_and_limits(
     count, levels = sizes[case, 0], sizes[case, 1]
     x, dt = outcome[0].state.x, tick_input[0].dt_s
     upper[10] = rate_limits(x, dt, parameters, lower, upper, matrix[0])
+    if tick_input[0].settings.lock_arm != 0:
+        lock_arm(lower, upper)
     assemble(
         catalogue,
         targets,
@@ -286,7 +295,10 @@ def decide_and_prepare(
     _begin(state, outcome)
     s = outcome[0].state
     i_ = tick_input[0]
-    position, rotation = s.desired_position.copy(), s.desired_rotation.copy()
+    position, rotation = np.empty(3), np.empty((3, 3))
+    use_tracker = i_.settings.use_tracker != 0
+    correct(s, i_.tracker, use_tracker, i_.dt_s, parameters)
+    aim(s, s.desired_position, s.desired_rotation, position, rotation)
     just_enabled = decide(outcome, tick_input, parameters)
     engaged = follow(outcome, tick_input, parameters)
     if just_enabled or s.safety != _ENABLED:
@@ -343,11 +355,13 @@ def conclude(
     command, report = outcome[0].command, outcome[0].report
     if s.engaged == 0 and command.moving == 0:
         s.x[9] = project_on_shaft(tick_input[0].trocar_position, base, end)[0]
-        s.desired_position[:] = s.tip_position
-        s.desired_rotation[:] = s.tip_rotation
+        expected_tip(s, s.desired_position, s.desired_rotation)
+    follow_tip(s, tick_input[0].dt_s, p.tracker_delay)
     for i in range(7):
         command.q[i] = s.x[i]
-    servo_angles(s.x[7], s.x[8], p.pitch_radius, p.pulley_radius, command.servo)
+    told = np.empty(2)
+    commanded_bend(s, parameters, told)
+    servo_angles(told[0], told[1], p.pitch_radius, p.pulley_radius, command.servo)
     report.x[:] = s.x
     report.theta, report.delta = polar(s.x[7], s.x[8])
     leader = tick_input[0].leader
@@ -360,6 +374,14 @@ def conclude(
         quaternion_from_matrix(s.desired_rotation, report.desired_wxyz)
     report.commanded_position[:] = s.tip_position
     quaternion_from_matrix(s.tip_rotation, report.commanded_wxyz)
+
+
+@compiled
+def wake(outcome: np.ndarray, parameters: np.ndarray) -> None:
+    """What the state remembers of sensing when the robot wakes up: nothing."""
+    s = outcome[0].state
+    start_correction(s)
+    s.contact_allowance = parameters[0].contact_force
 
 
 @compiled

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from robot.calibration import Calibration
 from robot.configuration import Configuration
 
 PARAMETERS = np.dtype(
@@ -32,6 +33,10 @@ PARAMETERS = np.dtype(
         ("contact_force", "f8"),
         ("tracker_delay", "f8"),
         ("correction_gain", "f8"),
+        ("gain", "f8", 2),
+        ("offset", "f8", 2),
+        ("friction", "f8", 2),
+        ("stick", "f8", 2),
         ("alignment_tolerance", "f8"),
         ("speed_max", "f8"),
         ("speed_min", "f8"),
@@ -47,8 +52,9 @@ PARAMETERS = np.dtype(
         ("characteristic_length", "f8"),
     ]
 )
-"""Fields as in ``robot.configuration``, in m, rad, s. ``rotation_flange_segment``: the segment's
-base frame in the flange frame; its z axis is the shaft's direction."""
+"""Fields as in ``robot.configuration`` and ``robot.calibration``, in m, rad, s, N.
+``rotation_flange_segment``: the segment's base frame in the flange frame; its z axis is the shaft's
+direction."""
 
 
 def _module_rotation(configuration: Configuration) -> np.ndarray:
@@ -62,12 +68,13 @@ def _degrees(value: float) -> float:
     return math.radians(value)
 
 
-def parameters(configuration: Configuration) -> np.ndarray:
-    """The (1,) read-only record of ``configuration``.
+def parameters(configuration: Configuration, calibration: Calibration | None = None) -> np.ndarray:
+    """The (1,) read-only record of ``configuration`` and ``calibration`` (by default: none needed).
 
     Joint limits already hold the margin that is kept from the mechanical stops.
     """
     record = np.zeros(1, PARAMETERS)
+    tendons = calibration or Calibration()
     limits, commands = configuration.limits, configuration.commands
     margin = _degrees(limits.joint_margin_deg)
     joints = configuration.arm.joints
@@ -95,6 +102,10 @@ def parameters(configuration: Configuration) -> np.ndarray:
         "contact_force": limits.contact_force_n,
         "tracker_delay": configuration.tracker.delay_ms * 1e-3,
         "correction_gain": configuration.tracker.correction_gain,
+        "gain": tendons.gain,
+        "offset": tendons.offset_rad,
+        "friction": tendons.friction_rad,
+        "stick": tendons.stick_rad,
         "alignment_tolerance": _degrees(configuration.teleoperation.alignment_tolerance_deg),
         "speed_max": commands.speed_max_mm_s * 1e-3,
         "speed_min": commands.speed_min_mm_s * 1e-3,

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robot.compensation import expected_bend, follow_setting
 from robot.compiled import compiled
 from robot.errors import KeyholeError
 from robot.records import RecordFields, Request, Safety
@@ -35,6 +36,8 @@ class Event(IntEnum):
     TRACKING_ERROR = 11
     SOLVER_FAILED = 12
     CONTROL_FAILED = 13
+    CONTACT_FORCE = 14
+    SIMULATION_FAILED = 15
 
 
 class Transition(NamedTuple):
@@ -74,6 +77,10 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition(_E, Event.CONTROL_FAILED, _F),
     Transition(_P, Event.CONTROL_FAILED, _F),
     Transition(_F, Event.CONTROL_FAILED, _F),
+    Transition(_E, Event.CONTACT_FORCE, _P),
+    Transition(_D, Event.SIMULATION_FAILED, _F),
+    Transition(_E, Event.SIMULATION_FAILED, _F),
+    Transition(_P, Event.SIMULATION_FAILED, _F),
 )
 """Every transition there is. An event that is not listed for a state leaves the state as it is; if
 it was an operator's request, it is refused."""
@@ -96,6 +103,14 @@ REASONS: dict[Event, tuple[str, str]] = {
     ),
     Event.SOLVER_FAILED: ("no motion satisfies the limits", "reset; move away from the limit"),
     Event.CONTROL_FAILED: ("the control loop failed", "read the log, then reset"),
+    Event.CONTACT_FORCE: (
+        "the instrument presses too hard on something",
+        "enable, then move away or withdraw",
+    ),
+    Event.SIMULATION_FAILED: (
+        "the simulation broke down and stands still",
+        "restart the console; tell what led to it",
+    ),
 }
 """For each event that led into the present state: why, and what to do."""
 
@@ -162,6 +177,8 @@ _STALE, _LOST, _TRACKING = (
     int(Event.MEASUREMENT_LOST),
     int(Event.TRACKING_ERROR),
 )
+_CONTACT, _SIMULATION = int(Event.CONTACT_FORCE), int(Event.SIMULATION_FAILED)
+_CONTACT_MARGIN = 1.25
 MEASUREMENT_TIMEOUT_S = 0.05
 
 
@@ -199,6 +216,23 @@ def _measured(tick_input: RecordFields) -> bool:
 
 
 @compiled
+def _watch_contact(outcome: np.ndarray, i: RecordFields, p: RecordFields) -> None:
+    """Pause where the contact force exceeds what is allowed.
+
+    Whoever enables in contact may move on with a little more force than there is, or nobody could
+    ever move away; once the force is below the limit, the limit counts again.
+    """
+    s = outcome[0].state
+    force = i.measured_contact
+    if i.request == _ENABLE:
+        s.contact_allowance = max(p.contact_force, _CONTACT_MARGIN * force)
+    if force <= p.contact_force:
+        s.contact_allowance = p.contact_force
+    if not force <= s.contact_allowance:
+        apply_event(outcome, _CONTACT)
+
+
+@compiled
 def decide(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) -> bool:
     """Apply this tick's request and what the measurement tells to the state in ``outcome``.
 
@@ -217,15 +251,19 @@ def decide(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) 
     before = s.safety
     if i.request != 0:
         apply_event(outcome, i.request)
+    if i.plant_failed != 0:
+        apply_event(outcome, _SIMULATION)
+        return False
     if not _measured(i):
         apply_event(outcome, _LOST)
         return False
+    _watch_contact(outcome, i, p)
     if before == _DISABLED and s.safety == _ENABLED:
         for k in range(7):
             s.x[k] = i.measured_q[k]
         u, v = bend_from_servos(i.measured_servo, p.pitch_radius, p.pulley_radius)
-        s.x[7] = u
-        s.x[8] = v
+        follow_setting(s, i.settings.compensation, 1.0)
+        expected_bend(s, u, v, parameters)
         return True
     if not tracking_distance(s.x, i.measured_q) <= p.tracking_error:
         apply_event(outcome, _TRACKING)

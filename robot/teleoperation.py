@@ -31,6 +31,7 @@ from robot.rotations import (
     orthonormalize,
 )
 from robot.safety import Event, apply_event
+from robot.sensing.tip_correction import expected_tip
 
 _ENABLED = int(Safety.ENABLED)
 _MATCHED = int(Alignment.MATCHED)
@@ -170,13 +171,10 @@ def approach(
 
 @compiled
 def release(s: RecordFields) -> None:
-    """Open the clutch: the desired pose is the commanded tip, nothing is left to chase."""
+    """Open the clutch: the desired pose is where the tip is, nothing is left to chase."""
     s.engaged = 0
     s.leader_kind = 0
-    for i in range(3):
-        s.desired_position[i] = s.tip_position[i]
-        for j in range(3):
-            s.desired_rotation[i, j] = s.tip_rotation[i, j]
+    expected_tip(s, s.desired_position, s.desired_rotation)
 
 
 @compiled

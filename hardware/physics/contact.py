@@ -28,7 +28,7 @@ def _progress(place: np.ndarray, line: np.ndarray, lengths: np.ndarray) -> float
         if off < best:
             best = off
             share = lengths[i] + t * (lengths[i + 1] - lengths[i])
-    return share / lengths[-1]
+    return float(share / lengths[-1])
 
 
 @compiled

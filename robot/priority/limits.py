@@ -101,6 +101,13 @@ def rate_limits(
 
 
 @compiled
+def lock_arm(lower: np.ndarray, upper: np.ndarray) -> None:
+    """Let the joints, and with them lambda, stand still; the segment alone moves."""
+    lower[:7], upper[:7] = 0.0, 0.0
+    lower[9], upper[9] = 0.0, 0.0
+
+
+@compiled
 def active_limits(
     x: np.ndarray,
     x_dot: np.ndarray,

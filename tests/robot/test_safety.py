@@ -41,6 +41,8 @@ EXPECTED: dict[Event, dict[Safety, Safety]] = {
     Event.TRACKING_ERROR: {E: F, P: F},
     Event.SOLVER_FAILED: {E: F},
     Event.CONTROL_FAILED: {D: F, E: F, P: F, F: F},
+    Event.CONTACT_FORCE: {E: P},
+    Event.SIMULATION_FAILED: {D: F, E: F, P: F},
 }
 EVERYTHING = list(itertools.product(Safety, Event))
 
@@ -257,3 +259,52 @@ def test_after_a_fault_there_is_no_motion_before_reset_enable_and_a_new_engageme
     drive.lead(np.array([0.2, 0.2, 0.2]))
     drive.tick()
     np.testing.assert_allclose(drive.desired[0], before, rtol=0, atol=1e-15)
+
+
+def test_too_much_contact_force_pauses(robot: InstrumentRobot) -> None:
+    limit = robot.configuration.limits.contact_force_n
+    drive = driving(robot)
+    drive.input["measured_contact"] = 0.99 * limit
+    assert drive.tick()["command"]["moving"] == 1
+    drive.input["measured_contact"] = 1.01 * limit
+    assert drive.tick()["command"]["moving"] == 0
+    assert drive.safety == P
+    assert drive.state["reason"][0] == Event.CONTACT_FORCE
+
+
+def test_a_contact_force_that_is_no_number_pauses(robot: InstrumentRobot) -> None:
+    drive = driving(robot)
+    drive.input["measured_contact"] = np.nan
+    drive.tick()
+    assert drive.safety == P
+
+
+def test_who_enables_in_contact_may_move_away_but_not_press_harder(robot: InstrumentRobot) -> None:
+    limit = robot.configuration.limits.contact_force_n
+    drive = driving(robot)
+    drive.input["measured_contact"] = 2.0 * limit
+    drive.tick()
+    drive.tick(Request.ENABLE)
+    assert drive.safety == E
+    assert drive.tick()["command"]["moving"] == 1
+    drive.input["measured_contact"] = 2.6 * limit
+    drive.tick()
+    assert drive.safety == P
+    drive.tick(Request.ENABLE)
+    drive.input["measured_contact"] = 0.5 * limit
+    drive.tick()
+    drive.input["measured_contact"] = 1.5 * limit
+    drive.tick()
+    assert drive.safety == P
+
+
+@pytest.mark.parametrize(("state", "following"), [(D, F), (E, F), (P, F), (F, F)])
+def test_a_simulation_that_broke_down_is_a_fault(
+    robot: InstrumentRobot, state: Safety, following: Safety
+) -> None:
+    drive = driving(robot)
+    drive.state["safety"] = state
+    drive.input["plant_failed"] = 1
+    x = drive.x
+    assert stood_still(drive.tick(), x)
+    assert drive.safety == following

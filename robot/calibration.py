@@ -1,0 +1,79 @@
+"""What a calibration of the tendons found: how a command to the servos becomes a bend.
+
+For each of the segment's coordinates
+
+    bend = offset + gain * commanded - friction * f
+
+where f, between -1 and 1, is the share of full friction that holds the tendons back: it follows the
+bend's motion over ``stick`` (Dahl's model of friction). Source: the stretch of the tendons in
+``docs/derivations.md``; neither is in paper 1.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError
+
+from robot.configuration import Section
+from robot.errors import KeyholeError
+
+Gain = Annotated[float, Field(ge=0.3, le=1.5, allow_inf_nan=False)]
+Small = Annotated[float, Field(ge=-0.5, le=0.5, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0.0, le=0.5, allow_inf_nan=False)]
+Stick = Annotated[float, Field(gt=0.0, le=1.0, allow_inf_nan=False)]
+
+
+class Calibration(Section):
+    """Of one robot; (u, v) in this order. The default is a robot without stretch and friction.
+
+    Attributes:
+        gain: bend over commanded bend.
+        offset_rad: bend at a straight command.
+        friction_rad: how far full friction holds the bend back.
+        stick_rad: over which motion friction turns around.
+        residual_deg: rms of what the model leaves unexplained in the sweep.
+        samples: measurements behind it.
+        robot: which robot it is of, for people.
+        configuration_hash: of the configuration it was made with, hexadecimal; empty for any.
+        made: date and time, UTC, for people.
+    """
+
+    schema_version: Literal[1] = 1
+    gain: tuple[Gain, Gain] = (1.0, 1.0)
+    offset_rad: tuple[Small, Small] = (0.0, 0.0)
+    friction_rad: tuple[Share, Share] = (0.0, 0.0)
+    stick_rad: tuple[Stick, Stick] = (0.05, 0.05)
+    residual_deg: Annotated[float, Field(ge=0.0)] = 0.0
+    samples: Annotated[int, Field(ge=0)] = 0
+    robot: str = ""
+    configuration_hash: str = ""
+    made: str = ""
+
+
+class CalibrationRefused(KeyholeError):
+    """A calibration file holds what cannot be used.
+
+    Attributes:
+        file: its name.
+    """
+
+    code = "calibration"
+
+    def __init__(self, file: str, reason: str) -> None:
+        super().__init__(f"{file}: {reason}; make it anew with 'keyhole calibrate'")
+        self.file = file
+
+
+def parse_calibration(table: dict[str, Any], file: str) -> Calibration:
+    """Validate what a TOML or JSON reader returned.
+
+    Raises:
+        CalibrationRefused: names the first wrong value and what is allowed.
+    """
+    try:
+        return Calibration.model_validate(table)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join(str(part) for part in first["loc"]) or "(whole file)"
+        raise CalibrationRefused(file, f"{key} = {first['input']!r}: {first['msg']}") from None

@@ -1,0 +1,1 @@
+"""What sensors say beyond the encoders, and what it changes."""
