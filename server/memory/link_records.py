@@ -13,6 +13,7 @@ import numpy as np
 
 from robot.records import LEADER, RECORD, SETTINGS, LeaderKind
 from server.memory.mapped import MappedRing, MappedSlot
+from server.memory.recording_link import create_recording_files
 
 SETTINGS_CHANGE = 100
 PATH_START = 101
@@ -156,3 +157,4 @@ def create_mapped_files(directory: Path, rate_hz: float, ring_seconds: float) ->
     capacity = max(2, round(rate_hz * ring_seconds))
     MappedRing(directory / RECORD_RING_FILE, RECORD, capacity, create=True).close()
     MappedRing(directory / REQUEST_FILE, REQUEST_MESSAGE, REQUEST_CAPACITY, create=True).close()
+    create_recording_files(directory)

@@ -16,6 +16,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from robot.calibration import Calibration
 from robot.configuration import Configuration
 from robot.errors import KeyholeError
 
@@ -23,6 +24,7 @@ _LOCK = "console.lock"
 _CONTROL_LOCK = "control.lock"
 _TOKEN = "token"
 _CONFIGURATION = "configuration.json"
+_CALIBRATION = "calibration.json"
 _CONSOLE = "console.json"
 
 
@@ -178,6 +180,18 @@ class RunDirectory:
     def configuration(self) -> Configuration:
         """The configuration of this console, as the supervisor validated it at the start."""
         return Configuration.model_validate_json(self._read(_CONFIGURATION))
+
+    def write_calibration(self, calibration: Calibration) -> None:
+        """Store the calibration that every process of this console uses."""
+        self.write(_CALIBRATION, calibration.model_dump_json().encode())
+
+    def calibration(self) -> Calibration | None:
+        """The calibration of this console; None where the tendons are taken as ideal."""
+        try:
+            content = (self.path / _CALIBRATION).read_bytes()
+        except OSError:
+            return None
+        return Calibration.model_validate_json(content)
 
     def write_console(self, console: dict[str, Any]) -> None:
         """Store what others may know of this console (``pid``, ``host``, ``port`` ...)."""

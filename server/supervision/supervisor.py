@@ -1,7 +1,7 @@
-"""The supervisor: starts control and web at once, watches both, and ends all in order.
+"""The supervisor: starts control, web and recorder at once, watches them, and ends all in order.
 
-Web is started again whenever it ends. Control, when it ends unexpectedly, is marked as down and
-then started again; it wakes up DISABLED and nothing but a person enables it.
+Web and recorder are started again whenever they end. Control, when it ends unexpectedly, is marked
+as down and then started again; it wakes up DISABLED and nothing but a person enables it.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import signal
 import socket
 import sys
 import time
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -32,12 +33,15 @@ from server.memory.link_records import (
     create_mapped_files,
 )
 from server.memory.mapped import MappedReadError, MappedSlot
+from server.memory.recording_link import RecordingLink
+from server.memory.replay_link import create_replay_files
 from server.memory.run_directory import RunDirectory
 from server.supervision.child_process import ChildProcess, describe_exit
 
 _WATCH_S = 0.25
 _CONTROL_PAUSE_S = 1.0
 _WEB_PAUSE_S = 0.25
+_RECORDER_PAUSE_S = 0.25
 _PATIENCE_S = 5.0
 _SILENCE_S = 5.0
 _CANNOT_START = 2
@@ -55,10 +59,19 @@ class Supervisor:
         directory: the run directory, taken.
         configuration: the validated configuration, already stored in the directory.
         listener: the public port.
+        replay: a recording that is shown in place of a robot; there is then neither control nor
+            recorder.
+        record: a file to record into from the start.
     """
 
     def __init__(
-        self, directory: RunDirectory, configuration: Configuration, listener: socket.socket
+        self,
+        directory: RunDirectory,
+        configuration: Configuration,
+        listener: socket.socket,
+        *,
+        replay: Path | None = None,
+        record: Path | None = None,
     ) -> None:
         control = configuration.control
         create_mapped_files(directory.path, control.rate_hz, control.record_ring_seconds)
@@ -70,9 +83,25 @@ class Supervisor:
         # The writing end is inherited by nobody, so it closes with this process.
         lifeline, self._lifeline_end = os.pipe()
         common = ["--run-directory", str(directory.path), "--lifeline-fd", str(lifeline)]
-        self._control = ChildProcess(
-            "control", "server.control.process", common, [lifeline], _CONTROL_PAUSE_S
-        )
+        self._recorder: ChildProcess | None = None
+        if replay is None:
+            self._control = ChildProcess(
+                "control", "server.control.process", common, [lifeline], _CONTROL_PAUSE_S
+            )
+            self._recorder = ChildProcess(
+                "recorder",
+                "server.recording.recorder_process",
+                common,
+                [lifeline],
+                _RECORDER_PAUSE_S,
+            )
+            self._ask_for(directory.path, record)
+        else:
+            create_replay_files(directory.path)
+            shown = [*common, "--file", str(replay)]
+            self._control = ChildProcess(
+                "replay", "server.recording.replay_process", shown, [lifeline], _CONTROL_PAUSE_S
+            )
         self._web = ChildProcess(
             "web",
             "server.web.process",
@@ -87,6 +116,14 @@ class Supervisor:
         self._ending = False
         self._exit_status = 0
 
+    @staticmethod
+    def _ask_for(directory: Path, record: Path | None) -> None:
+        """Have the recorder begin with its first breath; later requests come from web."""
+        if record is not None:
+            link = RecordingLink(directory)
+            link.start(record)
+            link.close()
+
     def run(self) -> int:
         """Start everything, watch it until SIGINT, SIGTERM or SIGHUP, end it in order.
 
@@ -97,11 +134,14 @@ class Supervisor:
         try:
             self._web.start()
             self._control.start()
+            if self._recorder is not None:
+                self._recorder.start()
             self._mark(ControlState.STARTING)
             while not self._ending:
                 self._wait(wake)
                 self._watch_control()
                 self._watch_web()
+                self._watch_recorder()
         finally:
             self._end()
         return self._exit_status
@@ -160,7 +200,10 @@ class Supervisor:
             self._has_run = True
             self._ticked = time.monotonic()
             rate, words = float(said["rate_hz"][0]), said["realtime"][0].decode()
-            say(f"control runs at {rate:g} Hz; real-time scheduling: {words}")
+            if self._recorder is None:
+                say("shows a recording; no robot is connected")
+            else:
+                say(f"control runs at {rate:g} Hz; real-time scheduling: {words}")
             if self._control.restarts:
                 self._message = f"{self._message}; control is back, disabled".lstrip("; ")
             self._mark(ControlState.RUNNING)
@@ -193,6 +236,15 @@ class Supervisor:
         elif self._web.restart_if_due():
             self._mark_again()
 
+    def _watch_recorder(self) -> None:
+        if self._recorder is None:
+            return
+        status = self._recorder.ended()
+        if status is not None and not self._ending:
+            say(f"the recorder ended unexpectedly ({describe_exit(status)}); it starts again")
+        else:
+            self._recorder.restart_if_due()
+
     def _mark_again(self) -> None:
         self._mark(self._control_state)
 
@@ -209,9 +261,11 @@ class Supervisor:
         self._supervision.write(record)
 
     def _end(self) -> None:
-        """End control first, so that the robot holds, then web."""
+        """End control first, so that the robot holds, then the recorder, then web."""
         if not self._control.finish(_PATIENCE_S):
             say(f"control did not end within {_PATIENCE_S:g} s and was ended by force")
+        if self._recorder is not None and not self._recorder.finish(_PATIENCE_S):
+            say(f"the recorder did not end within {_PATIENCE_S:g} s and was ended by force")
         if not self._web.finish(_PATIENCE_S):
             say(f"web did not end within {_PATIENCE_S:g} s and was ended by force")
         os.close(self._lifeline_end)

@@ -1,0 +1,1 @@
+"""Recordings: writing them, reading them back, checking them, and showing them again."""

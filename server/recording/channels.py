@@ -1,0 +1,207 @@
+"""The channels beside the records: what people plot, fifty times a second, as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from robot.records import LAMBDA, ErrorSource, LeaderKind, RecordFields, Safety
+from robot.safety import REASONS, Event
+
+RECORDS = "/records"
+GAPS = "/gaps"
+RATE_HZ = 50.0
+
+_NUMBER: dict[str, Any] = {"type": ["number", "null"]}
+_TEXT: dict[str, Any] = {"type": "string"}
+_INTEGER: dict[str, Any] = {"type": "integer"}
+
+
+class JsonChannel(NamedTuple):
+    """A topic, the name and JSON schema of its messages, and how one is made of a record."""
+
+    topic: str
+    schema_name: str
+    schema: dict[str, Any]
+    message: Callable[[RecordFields, int], dict[str, Any]]
+
+
+def _object(title: str, properties: dict[str, Any]) -> dict[str, Any]:
+    return {"title": title, "type": "object", "properties": properties}
+
+
+def _numbers(count: int, what: str) -> dict[str, Any]:
+    return {
+        "type": "array",
+        "items": _NUMBER,
+        "minItems": count,
+        "maxItems": count,
+        "description": what,
+    }
+
+
+_TIMESTAMP = _object("time", {"sec": _INTEGER, "nsec": _INTEGER})
+_POSE = _object(
+    "foxglove.PoseInFrame",
+    {
+        "timestamp": _TIMESTAMP,
+        "frame_id": _TEXT,
+        "pose": _object(
+            "foxglove.Pose",
+            {
+                "position": _object("foxglove.Vector3", dict.fromkeys("xyz", _NUMBER)),
+                "orientation": _object("foxglove.Quaternion", dict.fromkeys("xyzw", _NUMBER)),
+            },
+        ),
+    },
+)
+
+
+def _timestamp(time_ns: int) -> dict[str, int]:
+    return {"sec": time_ns // 1_000_000_000, "nsec": time_ns % 1_000_000_000}
+
+
+def _round(value: float, digits: int = 6) -> float:
+    return round(float(value), digits)
+
+
+def _pose(time_ns: int, position: np.ndarray, wxyz: np.ndarray) -> dict[str, Any]:
+    x, y, z = position.tolist()
+    w, qx, qy, qz = wxyz.tolist()
+    return {
+        "timestamp": _timestamp(time_ns),
+        "frame_id": "base",
+        "pose": {
+            "position": {"x": x, "y": y, "z": z},
+            "orientation": {"x": qx, "y": qy, "z": qz, "w": w},
+        },
+    }
+
+
+def _desired(record: RecordFields, time_ns: int) -> dict[str, Any]:
+    report = record["outcome"]["report"]
+    return _pose(time_ns, report["desired_position"], report["desired_wxyz"])
+
+
+def _commanded(record: RecordFields, time_ns: int) -> dict[str, Any]:
+    report = record["outcome"]["report"]
+    return _pose(time_ns, report["commanded_position"], report["commanded_wxyz"])
+
+
+def _true(record: RecordFields, time_ns: int) -> dict[str, Any]:
+    return _pose(time_ns, record["truth"]["position"], record["truth"]["wxyz"])
+
+
+def _errors(record: RecordFields, _: int) -> dict[str, Any]:
+    truth = record["truth"]
+    return {
+        "position_mm": _round(truth["position_error"] * 1e3),
+        "orientation_deg": _round(math.degrees(truth["orientation_error"])),
+        "rcm_mm": _round(truth["rcm_error"] * 1e3),
+        "source": ErrorSource(int(truth["source"])).name.lower(),
+    }
+
+
+def _joints(record: RecordFields, _: int) -> dict[str, Any]:
+    report, command = record["outcome"]["report"], record["outcome"]["command"]
+    measured = record["input"]
+    return {
+        "commanded_deg": np.rad2deg(report["x"][:7]).round(5).tolist(),
+        "measured_deg": np.rad2deg(measured["measured_q"]).round(5).tolist(),
+        "servo_commanded_deg": np.rad2deg(command["servo"]).round(5).tolist(),
+        "servo_measured_deg": np.rad2deg(measured["measured_servo"]).round(5).tolist(),
+        "bend_deg": _round(90.0 - math.degrees(report["theta"])),
+        "direction_deg": _round(math.degrees(report["delta"])),
+        "lambda": _round(report["x"][LAMBDA]),
+    }
+
+
+def _forces(record: RecordFields, _: int) -> dict[str, Any]:
+    return {
+        "tension_n": record["input"]["measured_tension"].round(5).tolist(),
+        "contact_n": _round(record["input"]["measured_contact"]),
+    }
+
+
+def _safety(record: RecordFields, _: int) -> dict[str, Any]:
+    state, report = record["outcome"]["state"], record["outcome"]["report"]
+    return {
+        "state": Safety(int(state["safety"])).name,
+        "reason": REASONS[Event(int(state["reason"]))][0],
+        "engaged": bool(state["engaged"]),
+        "leader": LeaderKind(int(state["leader_kind"])).name.lower(),
+        "limits": int(report["limits_active"]),
+    }
+
+
+_ERRORS_SCHEMA = _object(
+    "keyhole.Errors",
+    {
+        "position_mm": _NUMBER,
+        "orientation_deg": _NUMBER,
+        "rcm_mm": _NUMBER,
+        "source": {**_TEXT, "description": "errors are desired minus true, or minus measured"},
+    },
+)
+_JOINTS_SCHEMA = _object(
+    "keyhole.Joints",
+    {
+        "commanded_deg": _numbers(7, "joints as commanded, deg"),
+        "measured_deg": _numbers(7, "joints as measured, deg"),
+        "servo_commanded_deg": _numbers(4, "tendon servos as commanded, deg"),
+        "servo_measured_deg": _numbers(4, "tendon servos as measured, deg"),
+        "bend_deg": {**_NUMBER, "description": "bend of the segment, 0 when straight"},
+        "direction_deg": {**_NUMBER, "description": "direction of the bend"},
+        "lambda": {**_NUMBER, "description": "place of the trocar along the shaft, 0 to 1"},
+    },
+)
+_FORCES_SCHEMA = _object(
+    "keyhole.Forces",
+    {
+        "tension_n": _numbers(4, "measured tendon tensions, N"),
+        "contact_n": {**_NUMBER, "description": "largest contact force on the instrument, N"},
+    },
+)
+_SAFETY_SCHEMA = _object(
+    "keyhole.Safety",
+    {
+        "state": {"enum": [state.name for state in Safety]},
+        "reason": _TEXT,
+        "engaged": {"type": "boolean"},
+        "leader": _TEXT,
+        "limits": {**_INTEGER, "description": "bits of the limits that hold the motion back"},
+    },
+)
+
+JSON_CHANNELS = (
+    JsonChannel("/errors", "keyhole.Errors", _ERRORS_SCHEMA, _errors),
+    JsonChannel("/tip/desired", "foxglove.PoseInFrame", _POSE, _desired),
+    JsonChannel("/tip/commanded", "foxglove.PoseInFrame", _POSE, _commanded),
+    JsonChannel("/tip/true", "foxglove.PoseInFrame", _POSE, _true),
+    JsonChannel("/joints", "keyhole.Joints", _JOINTS_SCHEMA, _joints),
+    JsonChannel("/forces", "keyhole.Forces", _FORCES_SCHEMA, _forces),
+    JsonChannel("/safety", "keyhole.Safety", _SAFETY_SCHEMA, _safety),
+)
+
+GAP_SCHEMA = _object(
+    "keyhole.Gap",
+    {
+        "missing": {**_INTEGER, "description": "how many records were lost before the next one"},
+        "next_sequence": {**_INTEGER, "description": "number of the next record"},
+    },
+)
+
+
+def schema_bytes(schema: dict[str, Any]) -> bytes:
+    """A JSON schema as the file holds it."""
+    return json.dumps(schema).encode()
+
+
+def message_bytes(message: dict[str, Any]) -> bytes:
+    """A message as the file holds it; what is not a number (NaN) becomes null."""
+    return msgspec.json.encode(message)
