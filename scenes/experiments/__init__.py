@@ -25,7 +25,8 @@ class Experiment:
         name: as on the command line.
         title: for people.
         path: what the tip shall do.
-        board: name of the board it is made for.
+        board: name of the board it is made for; ``none`` where it needs none.
+        needs_room: whether it would run into a board that stands there all the same.
         lock_arm: whether the arm stands still meanwhile.
         cases: the priority cases under which the paper runs it, by name.
         marks: times that matter, s. Rings: the tip is half-way through, one for each. Square: it
@@ -39,6 +40,7 @@ class Experiment:
     lock_arm: bool = False
     cases: tuple[str, ...] = ("0", "1", "2")
     marks: tuple[float, ...] = ()
+    needs_room: bool = False
 
     @property
     def duration_s(self) -> float:
@@ -53,6 +55,7 @@ class _Plan(NamedTuple):
     lock_arm: bool = False
     cases: tuple[str, ...] = ("0", "1", "2")
     marks: Callable[[Configuration], tuple[float, ...]] = lambda _: ()
+    needs_room: bool = False
 
 
 _EXPERIMENTS = {
@@ -62,6 +65,7 @@ _EXPERIMENTS = {
         lock_arm=True,
         cases=("0",),
         marks=lambda _: (BENDING_S,),
+        needs_room=True,
     ),
     "arc-stylus": _Plan(
         "the same arc as a stylus asks for it, 12 s",
@@ -69,10 +73,13 @@ _EXPERIMENTS = {
         lock_arm=True,
         cases=("0",),
         marks=lambda _: (BENDING_S,),
+        needs_room=True,
     ),
-    "circle": _Plan("3 cm circle about z, 20 s", lambda _: circle(20.0, 1.0, 0, 1)),
+    "circle": _Plan("3 cm circle about z, 20 s", lambda _: circle(20.0, 1.0, (-1.0, 0.0, 0.0), 1)),
     "circle-yz": _Plan(
-        "3 cm circle in the y-z plane, 20 s", lambda _: circle(20.0, 1.0, 2, 1), cases=("0",)
+        "3 cm circle in the y-z plane, 20 s",
+        lambda _: circle(20.0, 1.0, (0.0, 0.0, 1.0), 1),
+        cases=("0",),
     ),
     "square": _Plan(
         "square of 23 mm sides from peg to peg, 10 s a side",
@@ -118,4 +125,5 @@ def experiment(name: str, configuration: Configuration) -> Experiment:
         plan.lock_arm,
         plan.cases,
         plan.marks(configuration),
+        plan.needs_room,
     )

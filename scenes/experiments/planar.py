@@ -16,19 +16,21 @@ _CIRCLE_RADIUS_M = 0.015
 _SWEEP_RAD = math.radians(40.0)
 
 
-def circle(duration_s: float, ramp_s: float, first: int, second: int) -> np.ndarray:
-    """A 3 cm circle through the start, in the plane of two base axes: samples (n, 8).
+def circle(
+    duration_s: float, ramp_s: float, towards: tuple[float, float, float], second: int
+) -> np.ndarray:
+    """A 3 cm circle through the start: samples (n, 8).
 
     Args:
         duration_s: of one turn.
         ramp_s: over which it gathers and loses its speed; 0 for an even speed throughout.
-        first: axis along which the centre lies, on its negative side.
-        second: axis along which the motion begins.
+        towards: unit vector, base frame, from the start to the centre.
+        second: base axis along which the motion begins.
     """
     samples = still(times(duration_s))
     angle = 2.0 * math.pi * cruise(samples[:, 0] / duration_s, ramp_s / duration_s)
-    samples[:, 1 + first] = _CIRCLE_RADIUS_M * (np.cos(angle) - 1.0)
-    samples[:, 1 + second] = _CIRCLE_RADIUS_M * np.sin(angle)
+    samples[:, 1:4] = _CIRCLE_RADIUS_M * np.outer(1.0 - np.cos(angle), towards)
+    samples[:, 1 + second] += _CIRCLE_RADIUS_M * np.sin(angle)
     return samples
 
 
@@ -44,7 +46,7 @@ def square(side_s: float) -> np.ndarray:
 
 def circle_infeasible(configuration: Configuration) -> np.ndarray:
     """The circle in 8 s while the tip shall also turn 40 degrees about its own y axis and back."""
-    samples = circle(8.0, 0.0, 0, 1)
+    samples = circle(8.0, 0.0, (-1.0, 0.0, 0.0), 1)
     start = start_tip_rotation(configuration)
     turn, own = np.empty((3, 3)), np.empty(4)
     for row in samples:
