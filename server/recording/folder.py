@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from robot.errors import KeyholeError
+from server.recording.errors import RecordingNotWritten
 
 SUFFIX = ".mcap"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._ -]{0,99}")
@@ -69,6 +70,25 @@ def following(path: Path) -> Path:
         number += 1
         free = path.with_name(f"{path.stem}-{number}{path.suffix}")
     return free
+
+
+def check_new(path: Path) -> Path:
+    """``path``, where a new recording can be made.
+
+    Raises:
+        RecordingNotWritten: there is a file already, or none can be made.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        detail = f"its folder cannot be made: {error.strerror}; choose another"
+        raise RecordingNotWritten(path, detail) from None
+    if path.exists():
+        raise RecordingNotWritten(path, "exists already; choose another name or move it away")
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        detail = "cannot be made: its folder is not open to you for writing; choose another"
+        raise RecordingNotWritten(path, detail)
+    return path
 
 
 def entries() -> list[RecordingEntry]:

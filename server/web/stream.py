@@ -98,6 +98,9 @@ class Progress:
 
     def sent(self, tick: int, now: float) -> None:
         """A state was sent."""
+        if self._unshown and tick < self._unshown[-1][0]:
+            # Control was started anew, or a replay went back: older numbers are never confirmed.
+            self._unshown.clear()
         if self._tells:
             self._unshown.append((tick, now))
 
