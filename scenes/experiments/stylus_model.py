@@ -22,9 +22,9 @@ from scenes.experiments.timing import minimum_jerk
 HEADER = "time_s,u_deg,v_deg"
 
 _RATE_HZ = 40.0
-_EVERY_S, _LASTING_S = 0.35, 0.6
+_EVERY_S, _LASTING_S = 0.3, 0.8
 """A movement begins this often and lasts this long."""
-_MISSES = 0.06
+_MISSES = 0.05
 """Of a movement's length, standard deviation in each direction."""
 _TREMOR_RAD = math.radians(0.15)
 _TREMOR_HZ = (8.3, 9.7, 10.9)
