@@ -4,9 +4,9 @@ For each of the segment's coordinates
 
     bend = offset + gain * commanded - friction * f
 
-where f, between -1 and 1, is the share of full friction that holds the tendons back: it follows the
-bend's motion over ``stick`` (Dahl's model of friction). Source: the stretch of the tendons in
-``docs/derivations.md``; neither is in paper 1.
+where f, between -1 and 1, is the share of full friction that holds the tendons back: it follows
+their motion in the disks over ``stick`` (Dahl's model of friction). Source: docs/derivations.md;
+paper 1 has neither stretch nor friction.
 """
 
 from __future__ import annotations

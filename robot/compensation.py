@@ -33,14 +33,47 @@ def friction_after(f: float, moved: float, stick: float) -> float:
 
 
 @compiled
+def tendon_motion(
+    u_before: float, v_before: float, u: float, v: float, chord: float, out: np.ndarray
+) -> None:
+    """How far each tendon slid through the disks, over the pitch radius (rad), positive is longer.
+
+    To the change by (u, v) comes what all four share: between disks they run straight, and
+    between n disks that are tilted against each other by phi / n the straight way is shorter, in
+    all by L phi^2 / (8 n^2).
+
+    Args:
+        u_before: bend before, rad.
+        v_before: likewise.
+        u: bend after, rad.
+        v: likewise.
+        chord: L / (8 n^2 r): shortening over pitch radius at 1 rad of bend.
+        out: (4,) filled.
+    """
+    shared = chord * ((u_before**2 + v_before**2) - (u**2 + v**2))
+    out[0] = u_before - u + shared
+    out[1] = v - v_before + shared
+    out[2] = u - u_before + shared
+    out[3] = v_before - v + shared
+
+
+@compiled
 def follow_friction(
     s: RecordFields, u_before: float, v_before: float, parameters: np.ndarray
 ) -> None:
-    """Carry the friction in the state ``s`` over the bend's last motion."""
+    """Carry the friction of the four tendons in the state ``s`` over the bend's last motion."""
     p = parameters[0]
-    before = (u_before, v_before)
-    for k in range(2):
-        s.friction[k] = friction_after(s.friction[k], s.x[7 + k] - before[k], p.stick[k])
+    slid = np.empty(4)
+    tendon_motion(u_before, v_before, s.x[7], s.x[8], p.chord, slid)
+    for i in range(4):
+        s.friction[i] = friction_after(s.friction[i], slid[i], p.stick[i % 2])
+
+
+@compiled
+def held_back(friction: np.ndarray, out: np.ndarray) -> None:
+    """How much the friction (4,) of the tendons holds u and v back (2,), shares of full."""
+    out[0] = 0.5 * (friction[2] - friction[0])
+    out[1] = 0.5 * (friction[1] - friction[3])
 
 
 @compiled
@@ -58,9 +91,11 @@ def follow_setting(s: RecordFields, compensation: int, step: float) -> None:
 def commanded_bend(s: RecordFields, parameters: np.ndarray, out: np.ndarray) -> None:
     """The (u, v) (2,) that the servos are told so that the segment bends to the state's (u, v)."""
     p = parameters[0]
+    shares = np.empty(2)
+    held_back(s.friction, shares)
     for k in range(2):
         gain = 1.0 + s.compensation[0] * (p.gain[k] - 1.0)
-        held = s.compensation[1] * p.friction[k] * s.friction[k]
+        held = s.compensation[1] * p.friction[k] * shares[k]
         out[k] = (s.x[7 + k] - s.compensation[0] * p.offset[k] + held) / gain
 
 
@@ -69,7 +104,9 @@ def expected_bend(s: RecordFields, u: float, v: float, parameters: np.ndarray) -
     """Set the state's (u, v) to the bend that the servos' (u, v) should give."""
     p = parameters[0]
     told = (u, v)
+    shares = np.empty(2)
+    held_back(s.friction, shares)
     for k in range(2):
         gain = 1.0 + s.compensation[0] * (p.gain[k] - 1.0)
-        held = s.compensation[1] * p.friction[k] * s.friction[k]
+        held = s.compensation[1] * p.friction[k] * shares[k]
         s.x[7 + k] = gain * told[k] + s.compensation[0] * p.offset[k] - held

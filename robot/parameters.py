@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from robot.calibration import Calibration
-from robot.configuration import Configuration
+from robot.configuration import Configuration, Instrument
 
 PARAMETERS = np.dtype(
     [
@@ -37,6 +37,7 @@ PARAMETERS = np.dtype(
         ("offset", "f8", 2),
         ("friction", "f8", 2),
         ("stick", "f8", 2),
+        ("chord", "f8"),
         ("alignment_tolerance", "f8"),
         ("speed_max", "f8"),
         ("speed_min", "f8"),
@@ -66,6 +67,12 @@ def _module_rotation(configuration: Configuration) -> np.ndarray:
 
 def _degrees(value: float) -> float:
     return math.radians(value)
+
+
+def chord_ratio(instrument: Instrument) -> float:
+    """L / (8 n^2 r): see :func:`robot.compensation.tendon_motion`."""
+    squared = 8.0 * instrument.disk_count**2
+    return instrument.segment_length_m / (squared * instrument.tendon_pitch_radius_m)
 
 
 def parameters(configuration: Configuration, calibration: Calibration | None = None) -> np.ndarray:
@@ -106,6 +113,7 @@ def parameters(configuration: Configuration, calibration: Calibration | None = N
         "offset": tendons.offset_rad,
         "friction": tendons.friction_rad,
         "stick": tendons.stick_rad,
+        "chord": chord_ratio(instrument),
         "alignment_tolerance": _degrees(configuration.teleoperation.alignment_tolerance_deg),
         "speed_max": commands.speed_max_mm_s * 1e-3,
         "speed_min": commands.speed_min_mm_s * 1e-3,

@@ -211,7 +211,7 @@ STATE = np.dtype(
         ("anchor_lock_rotation", "i8"),
         ("anchor_lock_translation", "i8"),
         ("anchor_rotation_base_leader", "f8", (3, 3)),
-        ("friction", "f8", 2),
+        ("friction", "f8", SERVOS),
         ("compensation", "f8", 2),
         ("tracker_sequence", "i8"),
         ("lagged_position", "f8", 3),
@@ -224,7 +224,7 @@ STATE = np.dtype(
 """Everything the robot remembers. ``x`` is the commanded configuration; the ``arm_*`` and ``tip_*``
 fields are its forward kinematics, kept so that each tick computes them once (``arm_jacobian``:
 rows linear then angular, of the point that coincides with the base origin, base frame).
-``friction``: how much the tendons' friction holds u and v back, shares of full, -1 to 1;
+``friction``: of each tendon in the disks, share of full, -1 to 1;
 ``compensation``: shares of gain and friction that are made up for;
 ``lagged_*``: the commanded tip as old as the tracker's samples; ``correction_*``: what the tracker
 says that the commanded tip is off (m, rotation vector in rad, base frame); ``contact_allowance``:

@@ -15,10 +15,10 @@ from robot.arm import Arm
 from robot.calibration import Calibration
 from robot.configuration import Configuration
 from robot.instrument_robot import InstrumentRobot
-from robot.parameters import parameters
+from robot.parameters import chord_ratio, parameters
 from robot.records import COMMAND
 from robot.rotations import matrix_from_quaternion
-from robot.sensing.tendon_fit import SweepTooPoor, bend_of, fit_axis
+from robot.sensing.tendon_fit import SweepTooPoor, bend_of, fit
 from robot.tendons import bend_from_servos, servo_angles
 from robot.urdf import urdf_text
 
@@ -125,7 +125,8 @@ def calibrate(
         found = sweep(plant, configuration, progress)
     finally:
         plant.close()
-    fits = [fit_axis(found.told[:, k], found.seen_at, found.seen[:, k]) for k in range(2)]
+    chord = chord_ratio(configuration.instrument)
+    fits = fit(found.told, found.seen_at, found.seen, chord)
     return Calibration(
         gain=(fits[0].gain, fits[1].gain),
         offset_rad=(fits[0].offset, fits[1].offset),

@@ -6,12 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot.compensation import friction_after
+from robot.compensation import friction_after, held_back, tendon_motion
 from robot.errors import KeyholeError
 
-STICKS_RAD = np.geomspace(0.004, 0.4, 25)
+STICKS_RAD = np.geomspace(0.005, 0.3, 20)
 """Ways over which friction may turn around; the best of them is taken."""
 FEWEST_SAMPLES = 50
+LEAST_MOTION_DEG = 30.0
 
 
 class SweepTooPoor(KeyholeError):
@@ -45,38 +46,51 @@ def bend_of(axis: np.ndarray) -> np.ndarray:
     return np.column_stack([scale * axis[:, 0], -scale * axis[:, 1]])
 
 
-def _friction(bend: np.ndarray, stick: float) -> np.ndarray:
-    """Share of full friction along a history of bends (n,)."""
-    shares = np.zeros(len(bend))
-    for k in range(1, len(bend)):
-        shares[k] = friction_after(shares[k - 1], bend[k] - bend[k - 1], stick)
+def _held_back(bends: np.ndarray, stick: float, chord: float) -> np.ndarray:
+    """Shares (n, 2) of full friction that hold u and v back along a history of bends (n, 2)."""
+    shares, slid, friction = np.zeros_like(bends), np.empty(4), np.zeros(4)
+    for k in range(1, len(bends)):
+        (u_before, v_before), (u, v) = bends[k - 1], bends[k]
+        tendon_motion(u_before, v_before, u, v, chord, slid)
+        for i in range(4):
+            friction[i] = friction_after(friction[i], slid[i], stick)
+        held_back(friction, shares[k])
     return shares
 
 
-def fit_axis(told: np.ndarray, seen_at: np.ndarray, seen: np.ndarray) -> AxisFit:
-    """Fit one coordinate.
+def fit(told: np.ndarray, seen_at: np.ndarray, seen: np.ndarray, chord: float) -> list[AxisFit]:
+    """Fit both coordinates.
 
     Args:
-        told: (n,) what the servos stood at, as bend, every tick, rad.
+        told: (n, 2) what the servos stood at, as bend (u, v), every tick, rad.
         seen_at: (m,) at which of these ticks the tip was seen.
-        seen: (m,) the bend seen then, rad.
+        seen: (m, 2) the bend seen then, rad.
+        chord: see :func:`robot.compensation.tendon_motion`.
+
+    Returns:
+        The fits of u and of v.
 
     Raises:
         SweepTooPoor: too few samples, or too little motion.
     """
-    if len(seen) < FEWEST_SAMPLES or np.ptp(told) < 0.5:
+    least = float(np.degrees(np.ptp(told, axis=0).min()))
+    if len(seen) < FEWEST_SAMPLES or least < LEAST_MOTION_DEG:
         raise SweepTooPoor(
-            f"{len(seen)} samples over {np.degrees(np.ptp(told)):.0f} deg of bend; at least "
-            f"{FEWEST_SAMPLES} over 29 deg are needed: check the tracker and that the servos move"
+            f"{len(seen)} samples over {least:.0f} deg of bend; at least {FEWEST_SAMPLES} over "
+            f"{LEAST_MOTION_DEG:.0f} deg are needed: check the tracker and that the servos move"
         )
-    best: AxisFit | None = None
+    best: list[AxisFit] = []
     for stick in STICKS_RAD:
-        shares = _friction(told, float(stick))[seen_at]
-        terms = np.column_stack([np.ones(len(seen)), told[seen_at], -shares])
-        solution = np.linalg.lstsq(terms, seen, rcond=None)[0]
-        left = float(np.sqrt(np.mean((terms @ solution - seen) ** 2)))
-        if best is None or left < best.residual:
-            offset, gain, friction = (float(value) for value in solution)
-            best = AxisFit(gain, offset, max(friction, 0.0), float(stick), left)
-    assert best is not None
+        shares = _held_back(told, float(stick), chord)[seen_at]
+        fits = [_axis(told[seen_at, k], shares[:, k], seen[:, k], float(stick)) for k in range(2)]
+        best = best or fits
+        best = [min(pair, key=lambda one: one.residual) for pair in zip(best, fits, strict=True)]
     return best
+
+
+def _axis(told: np.ndarray, share: np.ndarray, seen: np.ndarray, stick: float) -> AxisFit:
+    terms = np.column_stack([np.ones(len(seen)), told, -share])
+    solution = np.linalg.lstsq(terms, seen, rcond=None)[0]
+    left = float(np.sqrt(np.mean((terms @ solution - seen) ** 2)))
+    offset, gain, friction = (float(value) for value in solution)
+    return AxisFit(gain, offset, max(friction, 0.0), stick, left)
