@@ -24,6 +24,10 @@ class Breathing:
     period_s: float = 4.0
 
 
+STILL = Breathing()
+"""Not at all."""
+
+
 @dataclass(frozen=True)
 class TrocarMotion:
     """The breath that is drawn, and what follows it.
@@ -35,9 +39,9 @@ class TrocarMotion:
         until_s: when the last of the present breaths ends; infinite where none follows.
     """
 
-    present: Breathing = Breathing()
+    present: Breathing = STILL
     since_s: float = 0.0
-    following: Breathing = Breathing()
+    following: Breathing = STILL
     until_s: float = math.inf
 
     def changed(self, breathing: Breathing, time_s: float) -> TrocarMotion:

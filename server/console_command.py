@@ -9,21 +9,54 @@ import threading
 import time
 import webbrowser
 from pathlib import Path
+from typing import get_args
 
+from robot.configuration import Compensation, Configuration, Section, Simulation
 from robot.errors import UnknownName
 from server.version import version
 
 ROBOTS = ("instrument",)
 
+_SECTIONS: dict[str, type[Section]] = {"simulation": Simulation, "compensation": Compensation}
+_SIMULATED = {
+    "plant": ("simulation", "plant"),
+    "preset": ("simulation", "preset"),
+    "board": ("simulation", "board"),
+    "compensation": ("compensation", "mode"),
+}
+_HELP = {
+    "plant": "the robot",
+    "preset": "how good the simulated robot is",
+    "board": "what stands before the instrument",
+    "compensation": "how stretch and friction of the tendons are met",
+}
+
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``console`` to the command line."""
     parser = subparsers.add_parser("console", help="start the console (also without a command)")
+    add_page_arguments(parser)
+    parser.add_argument("--robot", default=ROBOTS[0], help=f"one of: {', '.join(ROBOTS)}")
+    parser.add_argument("--config", metavar="FILE", help="configuration (TOML)")
+    for flag, (table, key) in _SIMULATED.items():
+        choices = get_args(_SECTIONS[table].model_fields[key].annotation)
+        parser.add_argument(f"--{flag}", choices=choices, help=_HELP[flag])
+    parser.add_argument("--seed", type=_seed, help="draws what differs between robots of a preset")
+    parser.add_argument("--tracker", choices=("on", "off"), help="whether a tip tracker is used")
+    parser.add_argument(
+        "--record",
+        metavar="FILE",
+        nargs="?",
+        const="",
+        help="record from the start; without a name, into the folder of recordings",
+    )
+
+
+def add_page_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what says where the page is served, and whether it is opened."""
     parser.add_argument("--host", help="address to listen on (default: from the configuration)")
     parser.add_argument("--port", type=_port, help="port to listen on; 0 takes a free one")
-    parser.add_argument("--robot", default=ROBOTS[0], help=f"one of: {', '.join(ROBOTS)}")
     parser.add_argument("--no-browser", action="store_true", help="do not open a browser")
-    parser.add_argument("--config", metavar="FILE", help="configuration (TOML)")
     parser.add_argument(
         "--run-directory",
         metavar="DIR",
@@ -42,6 +75,33 @@ def _port(text: str) -> int:
     return port
 
 
+def _seed(text: str) -> int:
+    try:
+        seed = int(text)
+    except ValueError:
+        seed = -1
+    if not 0 <= seed < 2**31:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a seed; give a whole number from 0 on")
+    return seed
+
+
+def configured(configuration: Configuration, arguments: argparse.Namespace) -> Configuration:
+    """The configuration with what the command line chooses in its place."""
+    chosen: dict[str, dict[str, object]] = {"simulation": {}, "compensation": {}, "tracker": {}}
+    for flag, (table, key) in _SIMULATED.items():
+        if getattr(arguments, flag) is not None:
+            chosen[table][key] = getattr(arguments, flag)
+    if arguments.seed is not None:
+        chosen["simulation"]["seed"] = arguments.seed
+    if arguments.tracker is not None:
+        chosen["tracker"]["enabled"] = arguments.tracker == "on"
+    sections = {
+        table: getattr(configuration, table).model_copy(update=values)
+        for table, values in chosen.items()
+    }
+    return configuration.model_copy(update=sections)
+
+
 def execute(arguments: argparse.Namespace) -> int:
     """Run the console until it is told to end.
 
@@ -52,13 +112,51 @@ def execute(arguments: argparse.Namespace) -> int:
         KeyholeError: something stands against the start; nothing was started.
     """
     from server.configuration_file import load
+
+    if arguments.robot not in ROBOTS:
+        raise UnknownName("robot", arguments.robot, ROBOTS)
+    configuration = configured(load(arguments.config), arguments)
+    return serve(arguments, configuration, record=_recording_path(arguments.record))
+
+
+def _recording_path(wanted: str | None) -> Path | None:
+    """Where to record from the start; None for not at all.
+
+    Raises:
+        RecordingNotWritten: no recording can be made there.
+    """
+    if wanted is None:
+        return None
+    from server.recording.folder import check_new, named
+
+    return check_new(Path(wanted).absolute() if wanted else named())
+
+
+def serve(
+    arguments: argparse.Namespace,
+    configuration: Configuration,
+    *,
+    replay: Path | None = None,
+    record: Path | None = None,
+) -> int:
+    """Run the processes of a console until it is told to end.
+
+    Args:
+        arguments: those of :func:`add_page_arguments`.
+        configuration: of the robot.
+        replay: a recording to show in place of a robot.
+        record: a file to record into from the start.
+
+    Returns:
+        0 after an orderly end, 2 when the control process refused to start.
+
+    Raises:
+        KeyholeError: something stands against the start; nothing was started.
+    """
     from server.memory.run_directory import RunDirectory, default_path
     from server.supervision.listener import address_of, is_loopback, listen
     from server.supervision.supervisor import Supervisor, say
 
-    if arguments.robot not in ROBOTS:
-        raise UnknownName("robot", arguments.robot, ROBOTS)
-    configuration = load(arguments.config)
     host = configuration.server.host if arguments.host is None else arguments.host
     port = configuration.server.port if arguments.port is None else arguments.port
     directory = RunDirectory.take(arguments.run_directory or default_path())
@@ -72,12 +170,14 @@ def execute(arguments: argparse.Namespace) -> int:
                     "host": host,
                     "port": listener.getsockname()[1],
                     "address": address,
-                    "robot": arguments.robot,
+                    "robot": ROBOTS[0],
                     "started_ns": time.time_ns(),
                 }
             )
             url = f"{address}?token={directory.new_token()}"
-            supervisor = Supervisor(directory, configuration, listener)
+            supervisor = Supervisor(
+                directory, configuration, listener, replay=replay, record=record
+            )
             _announce(url)
             if not is_loopback(listener):
                 say(

@@ -92,7 +92,7 @@ class ControlLoop:
         self._state = robot.initial_state()
         self._forward = ForwardKinematics(urdf_text(configuration), robot.parameters)
         self._path: Path | None = None
-        self._path_time_ns = 0
+        self._path_time_ns, self._path_locks_arm = 0, False
         self._path_start_position = np.zeros(3)
         self._path_start_rotation = np.zeros((3, 3))
         self._path_sample = np.zeros(7)
@@ -145,8 +145,11 @@ class ControlLoop:
 
     def register_trocar(self, source: TrocarSource, position: np.ndarray) -> None:
         """Take the trocar to be at ``position`` (3,), base frame, m; not while ENABLED."""
+        state = self._state[0]
         self.trocar.register(source, position, self.time_s)
-        self.plant.register_trocar(self.trocar.registered)
+        self._shaft.find(state["safety"], state["x"], self.plant.read().q)
+        touched = source == TrocarSource.TOUCH
+        self.plant.register_trocar(position if touched else self._shaft.stand(position).nearest)
 
     def _check_trocar(self) -> None:
         """Before enabling: refuse it with the shaft outside of the trocar, else lead it there."""
@@ -165,9 +168,12 @@ class ControlLoop:
         """The path that is playing."""
         return self._path
 
-    def start_path(self, path: Path, path_id: int = 0) -> None:
-        """Play ``path`` from where the commanded tip is now; it excludes every other leader."""
-        self._path, self._path_time_ns = path, 0
+    def start_path(self, path: Path, path_id: int = 0, lock_arm: bool = False) -> None:
+        """Play ``path`` from where the commanded tip is now; it excludes every other leader.
+
+        With ``lock_arm`` the arm stands still as long as it plays.
+        """
+        self._path, self._path_time_ns, self._path_locks_arm = path, 0, lock_arm
         self._path_start_position[:] = self._state["tip_position"][0]
         self._path_start_rotation[:] = self._state["tip_rotation"][0]
         self._header["path_id"] = path_id
@@ -227,6 +233,8 @@ class ControlLoop:
         tick_input["settings"] = self.settings[0]
         if self._path is not None:
             self._path_leader(self._path)
+            if self._path_locks_arm:
+                tick_input["settings"]["lock_arm"] = 1
         else:
             tick_input["leader"] = self.leader[0]
         self.request = Request.NONE

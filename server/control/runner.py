@@ -123,7 +123,7 @@ class ControlRunner:
         """Play a path; whoever asked sees by the record's ``path_id`` that it plays."""
         with contextlib.suppress(OSError, ValueError):
             path = MappedPath(wanted.file, wanted.rows, f"path {wanted.path_id}")
-            self._loop.start_path(path, wanted.path_id)
+            self._loop.start_path(path, wanted.path_id, wanted.lock_arm)
 
     def _change_board(self, name: str) -> None:
         """Put another board before the instrument; the ticks that are missed meanwhile are no

@@ -53,11 +53,14 @@ _REQUESTS = frozenset(int(request) for request in Request)
 
 
 class PathStart(NamedTuple):
-    """A path to play: the file of its spline, how many samples it has, and its number."""
+    """A path to play: the file of its spline, how many samples it has, its number, and whether the
+    arm stands still meanwhile.
+    """
 
     file: Path
     rows: int
     path_id: int
+    lock_arm: bool = False
 
 
 class TrocarChange(NamedTuple):
@@ -166,7 +169,8 @@ class ControlLink:
             if kind == PATH_START:
                 path_id = int(message["path_id"])
                 file = self._directory / path_file(path_id)
-                self.path_start = PathStart(file, int(message["path_rows"]), path_id)
+                locks = bool(message["path_locks_arm"])
+                self.path_start = PathStart(file, int(message["path_rows"]), path_id, locks)
             elif kind == PATH_STOP:
                 self.path_stop = True
             elif kind in (TROCAR_CHANGE, BREATHING_CHANGE, BOARD_CHANGE):

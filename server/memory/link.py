@@ -65,12 +65,15 @@ class WebLink:
     Args:
         directory: the run directory.
 
+    Attributes:
+        directory: the same.
+
     Raises:
         MappedFileError: no console keeps its files there.
     """
 
     def __init__(self, directory: Path | str) -> None:
-        self._directory = Path(directory)
+        self.directory = self._directory = Path(directory)
         self._lock = threading.Lock()
         self._emergency_lock = threading.Lock()
         self._record = MappedSlot(self._directory / RECORD_SLOT_FILE, RECORD)
@@ -108,7 +111,7 @@ class WebLink:
         """Send the operator's choices, (1,) or () SETTINGS; returns the number to wait for."""
         return self._send(SETTINGS_CHANGE, settings=settings)
 
-    def start_path(self, samples: NDArray[np.float64], name: str) -> int:
+    def start_path(self, samples: NDArray[np.float64], name: str, lock_arm: bool = False) -> int:
         """Send a path and start it; returns the number to wait for.
 
         Takes about 1 ms for every 1000 samples: an event loop should leave it to a thread.
@@ -117,6 +120,7 @@ class WebLink:
             samples: (n >= 2, 8), columns time in s, increasing from 0, position in m, quaternion
                 w, x, y, z.
             name: shown while it plays; :meth:`status` tells it by the record's ``path_id``.
+            lock_arm: whether the arm stands still meanwhile.
 
         Raises:
             InvalidPose: the samples make no path; nothing is sent.
@@ -134,7 +138,9 @@ class WebLink:
             with contextlib.suppress(OSError):
                 # The one before may still be on its way to the control process.
                 (self._directory / path_file(path_id - 2)).unlink()
-            return self._send_locked(PATH_START, path_id=path_id, path_rows=len(rows))
+            return self._send_locked(
+                PATH_START, path_id=path_id, path_rows=len(rows), path_locks_arm=int(lock_arm)
+            )
 
     def stop_path(self) -> int:
         """Stop the path that plays, if any; returns the number to wait for."""

@@ -55,6 +55,7 @@ REQUEST_MESSAGE = np.dtype(
         ("kind", "i8"),
         ("path_id", "i8"),
         ("path_rows", "i8"),
+        ("path_locks_arm", "i8"),
         ("stamp_ns", "i8"),
         ("settings", SETTINGS),
         ("trocar_source", "i8"),

@@ -142,6 +142,53 @@ class PathStart(Body):
         return self
 
 
+class CompensationChange(Body):
+    """How stretch and friction of the tendons are met, and whether a tracker is listened to."""
+
+    mode: Literal["off", "gain", "full"] | None = Field(
+        None, description="Not at all, the stretch as a gain, or friction as well."
+    )
+    tracker: Flag | None = Field(
+        None, description="Whether what a tracker of the tip says corrects the tip."
+    )
+
+
+class BoardChange(Body):
+    """Which board shall stand before the instrument."""
+
+    name: Annotated[str, Field(min_length=1, max_length=80)] = Field(
+        description="Name from GET boards.", examples=["ring-board"]
+    )
+
+
+class TrocarRegistration(Body):
+    """Where the trocar is: where the tip touches it, at a position, or as configured."""
+
+    method: Literal["touch", "enter", "configuration"] = Field(examples=["enter"])
+    position_mm: Position | None = Field(
+        None,
+        description="With enter: x, y, z in mm, base frame, between two breaths.",
+        examples=[[400.0, 0.0, 120.0]],
+    )
+
+    @model_validator(mode="after")
+    def _position_where_entered(self) -> TrocarRegistration:
+        if (self.method == "enter") != (self.position_mm is not None):
+            raise ValueError("give position_mm with the method enter, and with no other")
+        return self
+
+
+class BreathingChange(Body):
+    """How the trocar breathes. What is left out stays as it is."""
+
+    amplitude_mm: Annotated[float, Field(strict=True, ge=0, le=10, allow_inf_nan=False)] | None = (
+        Field(None, description="How far a breath carries it out; 0 for a still one.")
+    )
+    period_s: Annotated[float, Field(strict=True, ge=1, le=20, allow_inf_nan=False)] | None = Field(
+        None, description="Length of a breath in s."
+    )
+
+
 class LeaseGrant(BaseModel):
     """The lease of the operator."""
 
@@ -169,6 +216,30 @@ class ExperimentEntry(BaseModel):
     name: str
     title: str
     duration_s: float = Field(description="Length in s.")
+    board: str = Field(description="Board that must stand there; none for any.")
+
+
+class BoardEntry(BaseModel):
+    """One board."""
+
+    name: str
+    title: str
+    present: bool = Field(description="Whether it stands before the instrument now.")
+
+
+class TrocarEntry(BaseModel):
+    """Where the trocar is, and how the shaft stands to it."""
+
+    model_config = ConfigDict(populate_by_name=True)
+
+    position_mm: list[float] = Field(description="Now, base frame.")
+    registered_mm: list[float] = Field(description="Between two breaths, base frame.")
+    method: Literal["configuration", "touch", "enter"]
+    distance_mm: float = Field(description="From the trocar to the shaft's axis.")
+    lambda_: float = Field(alias="lambda", description="Where it stands along the shaft.")
+    inserted: bool = Field(description="Whether the robot may be enabled with it.")
+    breathing_amplitude_mm: float
+    breathing_period_s: float
 
 
 class TransitionEntry(BaseModel):

@@ -11,6 +11,7 @@ from starlette.responses import Response
 from robot.priority.levels import case_named
 from robot.rotations import matrix_from_quaternion
 from server.web.api_models import (
+    CompensationChange,
     LeaderAnswer,
     LeaderPose,
     PriorityChange,
@@ -20,13 +21,14 @@ from server.web.api_models import (
 from server.web.api_robot import ROBOT, STATE
 from server.web.refusals import OutOfRange
 from server.web.services import Operator, Services, ServicesHere
-from server.web.state_message import ALIGNMENTS, COORDINATES, SOLVERS
+from server.web.state_message import ALIGNMENTS, COMPENSATIONS, COORDINATES, SOLVERS
 
 router = APIRouter(prefix=ROBOT, tags=["motion"])
 
 _SOLVER_OF = {name: solver for solver, name in SOLVERS.items()}
 _COORDINATES_OF = {name: coordinates for coordinates, name in COORDINATES.items()}
 _ALIGNMENT_OF = {name: alignment for alignment, name in ALIGNMENTS.items()}
+_COMPENSATION_OF = {name: mode for mode, name in COMPENSATIONS.items()}
 _METRES = 1e-3
 
 
@@ -68,6 +70,22 @@ async def teleoperation(
             settings["alignment"] = _ALIGNMENT_OF[body.alignment]
         if body.view_wxyz is not None:
             settings["rotation_base_leader"] = turned
+
+    await services.requests.settings(change)
+    return services.state(caller)
+
+
+@router.put("/compensation", summary="Choose how tendons and tracker are met", responses=STATE)
+async def compensation(
+    body: CompensationChange, services: ServicesHere, caller: Operator
+) -> Response:
+    """Takes effect smoothly from the next tick on. What is left out stays as it is."""
+
+    def change(settings: Any) -> None:
+        if body.mode is not None:
+            settings["compensation"] = _COMPENSATION_OF[body.mode]
+        if body.tracker is not None:
+            settings["use_tracker"] = body.tracker
 
     await services.requests.settings(change)
     return services.state(caller)

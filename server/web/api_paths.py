@@ -11,6 +11,7 @@ from starlette.responses import Response
 from robot.configuration import Configuration
 from server.web.api_models import ExperimentEntry, PathStart
 from server.web.api_robot import ROBOT, STATE
+from server.web.refusals import BoardNeeded
 from server.web.services import Operator, ServicesHere
 
 if TYPE_CHECKING:
@@ -25,19 +26,22 @@ def list_experiments(configuration: Configuration) -> list[ExperimentEntry]:
 
     found = [experiments.experiment(name, configuration) for name in experiments.names()]
     return [
-        ExperimentEntry(name=one.name, title=one.title, duration_s=one.duration_s) for one in found
+        ExperimentEntry(name=one.name, title=one.title, duration_s=one.duration_s, board=one.board)
+        for one in found
     ]
 
 
-def _path(body: PathStart, configuration: Configuration) -> Path:
+def _wanted(body: PathStart, configuration: Configuration) -> tuple[Path, str, bool]:
+    """The path, the board that it needs (``none`` for any), and whether the arm stands still."""
     if body.csv is not None:
         from scenes.path_file import parse_csv
 
-        return parse_csv(body.csv, body.name)
+        return parse_csv(body.csv, body.name), "none", False
     from scenes import experiments
 
     assert body.experiment is not None
-    return experiments.experiment(body.experiment, configuration).path
+    found = experiments.experiment(body.experiment, configuration)
+    return found.path, found.board, found.lock_arm
 
 
 @router.get("/experiments", summary="The experiments that can be played")
@@ -48,11 +52,17 @@ async def experiments(services: ServicesHere) -> list[ExperimentEntry]:
 
 @router.post("/path", summary="Play a path from where the tip is", responses=STATE)
 async def start_path(body: PathStart, services: ServicesHere, caller: Operator) -> Response:
-    """While it plays, no other leader is followed. 409 unless the robot is enabled and free."""
-    path = await asyncio.to_thread(_path, body, services.configuration)
+    """While it plays, no other leader is followed.
+
+    409 unless the robot is enabled and free, and the experiment's board stands there.
+    """
+    path, needed, locks_arm = await asyncio.to_thread(_wanted, body, services.configuration)
     services.lease.check(caller)
+    present = str(services.link.status()["board"])
+    if needed not in ("none", present):
+        raise BoardNeeded(path.name, needed, present)
     services.target.clear()
-    await services.requests.start_path(path.samples, path.name)
+    await services.requests.start_path(path.samples, path.name, locks_arm)
     return services.state(caller)
 
 

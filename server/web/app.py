@@ -11,7 +11,19 @@ from fastapi import FastAPI
 from robot.configuration import Configuration
 from server.memory.link import WebLink
 from server.version import version
-from server.web import api_lease, api_motion, api_paths, api_robot, api_safety, problems, stream
+from server.web import (
+    api_boards,
+    api_lease,
+    api_motion,
+    api_paths,
+    api_recording,
+    api_replay,
+    api_robot,
+    api_safety,
+    api_trocar,
+    problems,
+    stream,
+)
 from server.web.access import Access
 from server.web.access_guard import AccessGuard
 from server.web.page_files import add_page, describe
@@ -39,6 +51,10 @@ def create_app(
 
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        if services.replay is not None:
+            # There is no robot that an operator could be lost for.
+            yield
+            return
         watching = asyncio.create_task(services.watch.run())
         try:
             yield
@@ -58,8 +74,11 @@ def create_app(
     app.state.services = services
     app.add_middleware(AccessGuard, access=access)
     problems.install(app)
-    for part in (api_robot, api_lease, api_safety, api_motion, api_paths, stream):
-        app.include_router(part.router)
+    for part in (api_robot, api_lease, api_safety, api_motion, api_paths, api_trocar, api_boards):
+        app.include_router(part.router, dependencies=[api_replay.RobotOnly])
+    app.include_router(api_recording.router, dependencies=[api_replay.RobotOnly])
+    app.include_router(api_replay.router)
+    app.include_router(stream.router)
     app.include_router(viser_router(viser_address))
     add_page(app)
     describe(app)

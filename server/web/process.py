@@ -73,6 +73,8 @@ def load_the_rest(services: Services) -> None:
     try:
         list_experiments(services.configuration)
         services.dexterity.load()
+        services.trocar.load()
+        services.source.load_boards()
     except Exception:
         # Whoever asks for it will be told what is wrong with it.
         logging.getLogger("keyhole.web").exception("loading in advance failed")

@@ -165,6 +165,88 @@ class NotReady(WebRefusal):
         self.state, self.reason = state, reason
 
 
+class TrocarRefused(WebRefusal):
+    """The shaft cannot be meant to go through a trocar at this place.
+
+    Attributes:
+        distance_mm: from the shaft's axis.
+        farthest_mm: how far it may be.
+        lambda_along_shaft: where it stands along the shaft.
+        low: smallest allowed lambda.
+        high: largest allowed lambda.
+    """
+
+    code = "trocar_refused"
+    status = 422
+
+    def __init__(
+        self,
+        distance_mm: float,
+        farthest_mm: float,
+        lambda_along_shaft: float,
+        low: float,
+        high: float,
+    ) -> None:
+        super().__init__(
+            f"this place is {distance_mm:.1f} mm from the shaft's axis (at most {farthest_mm:g}) "
+            f"at \u03bb = {lambda_along_shaft:.3f} (allowed {low:g} to {high:g}); "
+            "check the numbers, they are in mm in the base frame"
+        )
+        self.distance_mm, self.farthest_mm = round(distance_mm, 3), farthest_mm
+        self.lambda_along_shaft, self.low, self.high = round(lambda_along_shaft, 4), low, high
+
+
+class NotInserted(WebRefusal):
+    """The shaft does not go through the trocar as it is registered.
+
+    Attributes:
+        distance_mm: from the trocar to the shaft's axis.
+        farthest_mm: how far it may be.
+        lambda_along_shaft: where the trocar stands along the shaft.
+        low: smallest allowed lambda.
+        high: largest allowed lambda.
+    """
+
+    code = "not_inserted"
+    status = 409
+
+    def __init__(
+        self,
+        distance_mm: float,
+        farthest_mm: float,
+        lambda_along_shaft: float,
+        low: float,
+        high: float,
+    ) -> None:
+        where = f"\u03bb = {lambda_along_shaft:.3f}, allowed {low:g} to {high:g}"
+        super().__init__(
+            f"the shaft does not go through the trocar: {distance_mm:.1f} mm beside it (at most "
+            f"{farthest_mm:g}), {where}; insert the shaft, or register the trocar anew"
+        )
+        self.distance_mm, self.farthest_mm = round(distance_mm, 3), farthest_mm
+        self.lambda_along_shaft, self.low, self.high = round(lambda_along_shaft, 4), low, high
+
+
+class BoardNeeded(WebRefusal):
+    """An experiment is made for another board than the one that stands there.
+
+    Attributes:
+        experiment: its name.
+        needed: name of its board.
+        present: name of the board that stands there.
+    """
+
+    code = "board_needed"
+    status = 409
+
+    def __init__(self, experiment: str, needed: str, present: str) -> None:
+        super().__init__(
+            f"{experiment} needs the board {needed}, and {present or 'no board'} is there: "
+            f"disable the robot, choose the board {needed}, enable, and start it again"
+        )
+        self.experiment, self.needed, self.present = experiment, needed, present
+
+
 class ControlSilent(WebRefusal):
     """The control process does not answer.
 
@@ -185,3 +267,57 @@ class UnreadableRequest(WebRefusal):
 
     code = "unreadable_request"
     status = 422
+
+
+class AlreadyRecording(WebRefusal):
+    """One recording is made at a time.
+
+    Attributes:
+        file: name of the one that is being made.
+    """
+
+    code = "already_recording"
+    status = 409
+
+    def __init__(self, file: str) -> None:
+        super().__init__(f"{file} is being recorded; stop that first")
+        self.file = file
+
+
+class RecordingFailed(WebRefusal):
+    """A recording cannot be made."""
+
+    code = "recording_failed"
+    status = 507
+
+
+class RecorderSilent(ControlSilent):
+    """The recorder process does not answer."""
+
+    code = "recorder_silent"
+
+
+class OnlyAReplay(WebRefusal):
+    """This console shows a recording, and there is no robot that could do what was asked."""
+
+    code = "only_a_replay"
+    status = 409
+
+    def __init__(self) -> None:
+        super().__init__("this is a replay of a recording: there is no robot, and nothing moves")
+
+
+class NoReplay(WebRefusal):
+    """This console shows a robot, not a recording."""
+
+    code = "no_replay"
+    status = 404
+
+    def __init__(self) -> None:
+        super().__init__("this console shows a robot; show a recording with 'keyhole replay FILE'")
+
+
+class ReplaySilent(ControlSilent):
+    """The replay process does not answer."""
+
+    code = "replay_silent"

@@ -12,6 +12,8 @@ from starlette.responses import Response
 
 from robot.configuration import Configuration
 from server.memory.link import WebLink
+from server.memory.recording_link import RecordingLink
+from server.memory.replay_link import ReplayLink
 from server.web.access import Caller
 from server.web.access_guard import caller_of
 from server.web.api_leaders import PoseLeader, TargetLeader
@@ -19,7 +21,9 @@ from server.web.control_requests import ControlRequests
 from server.web.dexterity_source import DexteritySource
 from server.web.lease import Lease
 from server.web.operator_watch import OperatorWatch
+from server.web.recordings import Recordings
 from server.web.state_source import StateSource
+from server.web.trocar_view import TrocarView
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,9 @@ class Services:
         pose: the API's clutched leader.
         watch: over the operator.
         dexterity: where the tip is.
+        trocar: how the shaft stands to the trocar.
+        recordings: to the recorder process.
+        replay: to the process that shows a recording; None where there is a robot.
         scene: ``loading``, ``ready``, or why there is no scene.
     """
 
@@ -48,6 +55,9 @@ class Services:
     pose: PoseLeader
     watch: OperatorWatch
     dexterity: DexteritySource
+    trocar: TrocarView
+    recordings: Recordings
+    replay: ReplayLink | None
     scene: Callable[[], str]
 
     def state(self, caller: Caller) -> Response:
@@ -60,19 +70,25 @@ def make_services(
 ) -> Services:
     """Put the services together."""
     lease = Lease(configuration.server.lease_seconds)
-    source = StateSource(link, configuration, lease)
+    recorder = RecordingLink(link.directory)
+    replay = ReplayLink(link.directory) if ReplayLink.is_in(link.directory) else None
+    source = StateSource(link, configuration, lease, recorder=recorder, replay=replay)
     target = TargetLeader(link, source, configuration)
     pose = PoseLeader(link, source, configuration)
+    trocar = TrocarView(configuration)
     return Services(
         configuration,
         link,
         lease,
         source,
-        ControlRequests(link, source),
+        ControlRequests(link, source, trocar),
         target,
         pose,
         OperatorWatch(link, source, lease, target, pose),
         DexteritySource(configuration),
+        trocar,
+        Recordings(recorder),
+        replay,
         scene,
     )
 

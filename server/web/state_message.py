@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from robot.records import (
     RECORD,
     Alignment,
     Case,
+    Compensation,
     Coordinates,
     ErrorSource,
     LeaderKind,
@@ -30,6 +32,9 @@ from robot.records import (
     Solver,
 )
 from robot.safety import REASONS, Event
+from scenes.boards.board import BOARD_NAMES, board
+from scenes.trocar_motion import STILL, Breathing
+from server.memory.replay_link import ReplayStatus
 
 MESSAGE_SCHEMA_VERSION = 1
 
@@ -37,6 +42,7 @@ CASES = {case: name for name, case in CASE_NAMES.items()}
 SOLVERS = {solver: solver.name.lower().replace("_", "-") for solver in Solver}
 COORDINATES = {coordinates: coordinates.name.lower() for coordinates in Coordinates}
 ALIGNMENTS = {alignment: alignment.name.lower() for alignment in Alignment}
+COMPENSATIONS = {mode: mode.name.lower() for mode in Compensation}
 
 _REFUSED: dict[Refusal, tuple[str, str]] = {
     Refusal.TARGET_TOO_FAR: ("the target is too far from the tip", "choose a nearer target"),
@@ -57,20 +63,30 @@ class Surroundings:
         control: ``running``, ``starting`` or ``down``.
         control_words: why control does not run, empty when it does.
         plant: name of the plant.
+        board: name of the board before the instrument.
+        trocar_source: how the trocar came to be where it is taken to be.
+        breathing: how it was last asked to breathe.
         realtime: scheduling of the control process, in words.
         path_name: name of the path that plays, if one does.
         rate_hz: measured rate of the loop, None while it is not known.
         real_time_factor: plant time over host time, None while it is not known.
+        recording: whether records are being written down.
+        replay: what is shown of a recording; None where there is a robot.
     """
 
     now_ns: int
     control: str
     control_words: str = ""
     plant: str = ""
+    board: str = "none"
+    trocar_source: str = "configuration"
+    breathing: Breathing = STILL
     realtime: str = ""
     path_name: str | None = None
     rate_hz: float | None = None
     real_time_factor: float | None = None
+    recording: bool = False
+    replay: ReplayStatus | None = None
 
 
 @dataclass(frozen=True)
@@ -122,6 +138,9 @@ class StateMessages:
         self._parameters = parameters(configuration)
         self._teleoperation = configuration.teleoperation
         self._limits = configuration.limits
+        self._simulation = configuration.simulation
+        self._configuration = configuration
+        self._boards: dict[str, tuple[int, bool]] = {}
         lower, upper = self._parameters["joint_lower"][0], self._parameters["joint_upper"][0]
         self._joint_limits = [
             list(pair) for pair in zip(_degrees(lower), _degrees(upper), strict=True)
@@ -140,6 +159,22 @@ class StateMessages:
         settings["alignment"] = Alignment[teleoperation.alignment.upper()]
         settings["hold_to_move"] = teleoperation.hold_to_move
         settings["motion_scale"] = teleoperation.motion_scale
+        settings["compensation"] = Compensation[configuration.compensation.mode.upper()]
+        settings["use_tracker"] = configuration.tracker.enabled
+
+    def load_boards(self) -> None:
+        """Find out about every board."""
+        for name in BOARD_NAMES:
+            self._board(name)
+
+    def _board(self, name: str) -> tuple[int, bool]:
+        """How many rings the board of that name has, and whether it has a ball."""
+        if name not in BOARD_NAMES:
+            return 0, False
+        if name not in self._boards:
+            found = board(name, self._configuration)
+            self._boards[name] = len(found.rings), found.ball is not None
+        return self._boards[name]
 
     def message(
         self, record: NDArray[Any] | None, around: Surroundings, operator: OperatorView
@@ -154,7 +189,8 @@ class StateMessages:
         known = self._unknown if record is None else record
         body = self._body(known[0], around)
         if record is None:
-            configured = ("priority", "teleoperation", "bend_limit_deg", "joint_limits_deg")
+            configured = ("priority", "teleoperation", "bend_limit_deg", "joint_limits_deg",
+                          "compensation", "tracker")  # fmt: skip
             body = {**_nulled(body), **{name: body[name] for name in configured}}
         return {
             "type": "state",
@@ -170,7 +206,9 @@ class StateMessages:
                 else round(operator.expires_in_s, 2),
             },
             "plant": around.plant,
-            "recording": False,
+            **self._robot_of(around),
+            "recording": around.recording,
+            "replay": None if around.replay is None else replay_view(around.replay),
             "control": around.control,
         }
 
@@ -197,6 +235,13 @@ class StateMessages:
             "commanded": _pose(report["commanded_position"], report["commanded_wxyz"]),
             "true": _pose(truth["position"], truth["wxyz"]),
             "trocar_mm": _millimetres(tick_input["trocar_position"]),
+            "trocar": _trocar(around),
+            "compensation": COMPENSATIONS[
+                Compensation(int(tick_input["settings"]["compensation"]))
+            ],
+            "tracker": _tracker(tick_input, state),
+            "tension_n": _each(tick_input["measured_tension"], 3),
+            **self._touched(record, around.board),
             "residuals": {
                 "rcm_mm_s": _round(report["residual_rcm"] * 1e3, 4),
                 "linear_mm_s": _round(report["residual_linear"] * 1e3, 4),
@@ -205,6 +250,36 @@ class StateMessages:
             "limits": describe(int(report["limits_active"]), report["x"], self._parameters),
             "loop": _loop(header, around),
             "path": _path(header, around),
+        }
+
+    def _robot_of(self, around: Surroundings) -> dict[str, Any]:
+        """Which of the simulated robots it is."""
+        physics = around.plant == "physics"
+        return {
+            "preset": self._simulation.preset if physics else None,
+            "seed": self._simulation.seed if physics else None,
+            "board": around.board,
+        }
+
+    def _touched(self, record: np.void, name: str) -> dict[str, Any]:
+        """Contact, and what has been done on the board of that name."""
+        truth, tick_input = record["truth"], record["input"]
+        allowed = max(self._limits.contact_force_n, record["outcome"]["state"]["contact_allowance"])
+        rings, has_ball = self._board(name)
+        return {
+            "contact": {
+                "count": int(truth["contact_count"]),
+                "force_n": _round(tick_input["measured_contact"], 4),
+                "limit_n": _round(allowed, 4),
+            },
+            "rings": {
+                "passed": int(truth["rings_passed"]).bit_count(),
+                "touched": int(truth["rings_touched"]).bit_count(),
+                "total": rings,
+            }
+            if rings
+            else None,
+            "ball": {"progress": _round(truth["ball_progress"], 4)} if has_ball else None,
         }
 
     def _teleoperation_of(self, settings: np.void) -> dict[str, Any]:
@@ -255,6 +330,40 @@ def _safety(record: np.void, around: Surroundings) -> dict[str, str]:
         "reason": reason,
         "reason_code": code,
         "action": action,
+    }
+
+
+def replay_view(status: ReplayStatus) -> dict[str, Any]:
+    """What is shown of a recording, as the message tells it."""
+    return {
+        "file": status.path.name,
+        "time_s": round(status.time_s, 3),
+        "duration_s": round(status.duration_s, 3),
+        "playing": status.playing,
+        "speed": status.speed,
+        "started": datetime.fromtimestamp(status.started_ns * 1e-9, UTC).isoformat("T", "seconds"),
+        "cut": status.cut,
+    }
+
+
+def _trocar(around: Surroundings) -> dict[str, Any]:
+    breathing = around.breathing
+    return {
+        "method": around.trocar_source,
+        "breathing_amplitude_mm": _round(breathing.amplitude_m * 1e3, 6),
+        "breathing_period_s": _round(breathing.period_s, 6),
+    }
+
+
+def _tracker(tick_input: np.void, state: np.void) -> dict[str, Any]:
+    """Whether the tracker is listened to, and by how much the tip is corrected for it."""
+    position, rotation = state["correction_position"], state["correction_rotation"]
+    seen = tick_input["tracker"]["sequence"] > 0
+    return {
+        "on": bool(tick_input["settings"]["use_tracker"]),
+        "age_ms": _round(tick_input["tracker"]["age_s"] * 1e3, 3) if seen else None,
+        "correction_mm": _round(float(np.linalg.norm(position)) * 1e3, 4),
+        "correction_deg": _round(math.degrees(float(np.linalg.norm(rotation))), 4),
     }
 
 

@@ -106,6 +106,57 @@ class PathPart(Part):
     progress: float | None = Field(description="0 to 1.")
 
 
+class TrocarPart(Part):
+    """How the trocar was registered, and how it was last asked to breathe."""
+
+    method: Literal["configuration", "touch", "enter"]
+    breathing_amplitude_mm: float | None
+    breathing_period_s: float | None
+
+
+class TrackerPart(Part):
+    """A tracker of the tip, and the correction that it led to."""
+
+    on: bool
+    age_ms: float | None = Field(description="Of its newest sample; null without one.")
+    correction_mm: float | None
+    correction_deg: float | None
+
+
+class ContactPart(Part):
+    """What the instrument touches."""
+
+    count: int | None
+    force_n: float | None = Field(description="The largest, as a sensor reads it.")
+    limit_n: float | None = Field(description="Above it the motion pauses.")
+
+
+class RingsPart(Part):
+    """How many rings of the board the tip was half-way through, and how many it touched."""
+
+    passed: int | None
+    touched: int | None
+    total: int | None
+
+
+class BallPart(Part):
+    """How far the ball is along its groove."""
+
+    progress: float | None = Field(description="0 to 1.")
+
+
+class ReplayPart(Part):
+    """What is shown of a recording."""
+
+    file: str
+    time_s: float = Field(description="Since the recording's start, s.")
+    duration_s: float = Field(description="Length of the recording, s.")
+    playing: bool
+    speed: float = Field(description="Recorded time over real time.")
+    started: str = Field(description="When it was recorded, UTC.")
+    cut: bool = Field(description="Whether the recording was cut off.")
+
+
 class StateMessage(Part):
     """Everything about the robot at one tick. Positions and poses in the base frame."""
 
@@ -134,10 +185,21 @@ class StateMessage(Part):
     commanded: PosePart
     true: PosePart
     trocar_mm: Millimetres = Field(min_length=3, max_length=3)
+    trocar: TrocarPart
+    compensation: Literal["off", "gain", "full"]
+    tracker: TrackerPart
+    tension_n: list[float | None] = Field(min_length=4, max_length=4)
+    contact: ContactPart
+    rings: RingsPart | None = Field(description="Null without rings.")
+    ball: BallPart | None = Field(description="Null without a ball.")
     residuals: ResidualsPart
     limits: list[str] = Field(description="Limits that hold the motion back, in words.")
     loop: LoopPart
     path: PathPart | None
     plant: str
+    preset: str | None = Field(description="Of the simulated robot; null for the kinematic one.")
+    seed: int | None = Field(description="Likewise.")
+    board: str = Field(description="Name of the board before the instrument.")
     recording: bool
+    replay: ReplayPart | None = Field(description="Null where there is a robot.")
     control: Literal["running", "starting", "down"]

@@ -14,6 +14,8 @@ from robot.configuration import Configuration
 from robot.records import Safety
 from server.memory.link import WebLink
 from server.memory.mapped import MappedReadError
+from server.memory.recording_link import RecordingLink
+from server.memory.replay_link import ReplayLink
 from server.web.access import Caller
 from server.web.lease import Lease
 from server.web.refusals import ControlSilent
@@ -64,6 +66,8 @@ class StateSource:
         configuration: of the robot.
         lease: who drives.
         clock_ns: the host's monotonic clock.
+        recorder: tells whether records are written down; None without a recorder.
+        replay: tells what is shown of a recording; None where there is a robot.
 
     Attributes:
         newest_tick: tick of the newest record read.
@@ -75,7 +79,10 @@ class StateSource:
         configuration: Configuration,
         lease: Lease,
         clock_ns: Callable[[], int] = time.monotonic_ns,
+        recorder: RecordingLink | None = None,
+        replay: ReplayLink | None = None,
     ) -> None:
+        self._recorder, self._replay, self._records = recorder, replay, False
         self._link, self._lease, self._clock_ns = link, lease, clock_ns
         self._messages = StateMessages(configuration)
         self._meter = LoopMeter()
@@ -129,6 +136,11 @@ class StateSource:
     def forget_texts(self) -> None:
         """Make the next :meth:`text` anew: something beside the record has changed."""
         self._texts.clear()
+        self._status_at = -_STATUS_NS
+
+    def load_boards(self) -> None:
+        """Find out about every board, which the first message with it would wait for."""
+        self._messages.load_boards()
 
     def _message(self, you: bool) -> dict[str, Any]:
         record = self.record()
@@ -141,6 +153,7 @@ class StateSource:
         now = self._clock_ns()
         if now - self._status_at >= _STATUS_NS:
             self._status, self._status_at = self._link.status(), now
+            self._records = self._recorder is not None and self._recorder.status().records
         return self._status
 
     def _surroundings(self, record: NDArray[Any] | None) -> Surroundings:
@@ -159,10 +172,15 @@ class StateSource:
             control=control,
             control_words=words,
             plant=str(status["plant"]),
+            board=str(status["board"]),
+            trocar_source=status["trocar_source"].name.lower(),
+            breathing=status["breathing"],
             realtime=str(status["realtime"]),
             path_name=self._path_name(path_id),
             rate_hz=rate_hz,
             real_time_factor=factor,
+            recording=self._records,
+            replay=None if self._replay is None else self._replay.status(),
         )
 
     def _path_name(self, path_id: int) -> str | None:

@@ -53,7 +53,7 @@ class Complaints:
 @pytest.fixture(scope="package")
 def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ConsoleProcess]:
     """Supervisor, control and web, running."""
-    with ConsoleProcess(tmp_path_factory.mktemp("browser")) as running:
+    with ConsoleProcess(tmp_path_factory.mktemp("browser"), "--plant", "kinematic") as running:
         running.wait_until_running()
         yield running
 

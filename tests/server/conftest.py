@@ -21,7 +21,7 @@ def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ConsoleProcess
     assert patient.count("= 1500.0") == 2
     config = folder / "patient.toml"
     config.write_text(patient)
-    with ConsoleProcess(folder, "--config", str(config)) as running:
+    with ConsoleProcess(folder, "--config", str(config), "--plant", "kinematic") as running:
         running.wait_until_running()
         yield running
 

@@ -11,6 +11,7 @@ import pytest
 from robot.errors import KeyholeError
 from server import command_line, console_command
 from server.command_line import COMMANDS, main
+from server.configuration_file import load
 from server.supervision.child_process import module_command, module_environment
 from server.version import version
 
@@ -52,6 +53,9 @@ def test_the_console_is_the_default(
         (["--port", "70000"], "is not a port; give a number from 0 to 65535"),
         (["--port", "http"], "is not a port"),
         (["--speed", "3"], "unrecognized arguments"),
+        (["--preset", "perfect"], "invalid choice: 'perfect'"),
+        (["--seed", "-1"], "is not a seed"),
+        (["--board", "chess"], "invalid choice: 'chess'"),
         (["fly"], "invalid choice: 'fly'"),
         (["bench"], "required"),
     ],
@@ -65,6 +69,22 @@ def test_wrong_arguments_are_refused_in_one_line(
     assert told.err.startswith("keyhole")
     assert words in told.err
     assert told.err.count("\n") == 1
+
+
+def test_the_command_line_replaces_what_the_configuration_says(
+    started: list[argparse.Namespace],
+) -> None:
+    assert main(["--plant", "kinematic", "--seed", "7", "--tracker", "on"]) == 0
+    assert main(["--preset", "harsh", "--board", "none", "--compensation", "gain"]) == 0
+    file = load()
+    first, second = (console_command.configured(file, arguments) for arguments in started)
+    assert (first.simulation.plant, first.simulation.seed) == ("kinematic", 7)
+    assert first.tracker.enabled
+    assert first.simulation.preset == file.simulation.preset
+    assert (second.simulation.preset, second.simulation.board) == ("harsh", "none")
+    assert second.compensation.mode == "gain"
+    assert second.tracker == file.tracker
+    assert type(first).model_validate(first.model_dump()) == first
 
 
 def test_a_refusal_is_one_line_and_status_2(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from robot.errors import InvalidPose
 from robot.records import RECORD, SETTINGS, LeaderKind, Request
 from scenes.path import Path as ScenePath
+from scenes.trocar_motion import Breathing
 from server.control.mapped_path import MappedPath
 from server.memory.control_link import HOLD_TIMEOUT_NS, WEB_TIMEOUT_NS, ControlLink
 from server.memory.link import WebLink
@@ -23,6 +24,7 @@ from server.memory.link_records import (
     SUPERVISION_FILE,
     ControlState,
     Phase,
+    TrocarSource,
     create_mapped_files,
 )
 from server.memory.mapped import MappedReadError, MappedSlot
@@ -258,10 +260,11 @@ def test_a_path_arrives_with_its_number_and_name(
     web: WebLink, control: ControlLink, directory: Path
 ) -> None:
     for name in ("first", "second", "third"):
-        number = web.start_path(rows(5), name)
+        number = web.start_path(rows(5), name, lock_arm=name == "second")
         poll(control)
         assert control.path_start is not None
-        file, rows_given, _ = control.path_start
+        file, rows_given, _, locks_arm = control.path_start
+        assert locks_arm == (name == "second")
         at, expected = np.empty(7), np.empty(7)
         for time_s in (0.0, 0.7, 3.9, 9.0):
             MappedPath(file, rows_given, name).at(time_s, at)
@@ -341,3 +344,33 @@ def test_a_file_too_short_for_a_path_is_none(web: WebLink, control: ControlLink)
         file.truncate(100)
     with pytest.raises(ValueError, match="size"):
         MappedPath(control.path_start.file, control.path_start.rows, "cut")
+
+
+def changes(control: ControlLink) -> tuple[Any, Any, Any]:
+    """What the next poll brings of trocar, breathing and board."""
+    poll(control)
+    return control.trocar_change, control.breathing, control.board
+
+
+def test_changes_of_trocar_and_board_come_one_a_tick(web: WebLink, control: ControlLink) -> None:
+    place, breathing = np.array([0.4, -0.01, 0.12]), Breathing(0.005, 3.0)
+    web.register_trocar(TrocarSource.ENTER, place)
+    web.breathe(breathing)
+    number = web.change_board(2)
+    trocar, *others = changes(control)
+    assert trocar.source == TrocarSource.ENTER
+    assert trocar.position.tolist() == place.tolist()
+    assert others == [None, None]
+    assert changes(control) == (None, breathing, None)
+    assert changes(control) == (None, None, 2)
+    assert control.request_sequence == number
+    assert changes(control) == (None, None, None)
+
+
+def test_an_emergency_stop_voids_a_trocar_that_was_sent_before(
+    web: WebLink, control: ControlLink
+) -> None:
+    web.register_trocar(TrocarSource.TOUCH, np.zeros(3))
+    web.emergency_stop()
+    assert poll(control) == Request.EMERGENCY_STOP
+    assert control.trocar_change is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import msgspec
@@ -15,6 +16,7 @@ from robot.records import (
     RECORD,
     Alignment,
     Case,
+    Compensation,
     Coordinates,
     LeaderKind,
     Refusal,
@@ -134,7 +136,8 @@ def test_a_refused_wish_is_explained(
 def test_every_choice_has_a_name(messages: StateMessages, record: NDArray[Any]) -> None:
     settings = record["input"]["settings"]
     for field, choices in (
-        ("case", Case), ("solver", Solver), ("coordinates", Coordinates), ("alignment", Alignment)
+        ("case", Case), ("solver", Solver), ("coordinates", Coordinates), ("alignment", Alignment),
+        ("compensation", Compensation),
     ):  # fmt: skip
         for choice in choices:
             settings[field] = choice
@@ -150,6 +153,43 @@ def test_a_path_has_name_and_progress(messages: StateMessages, record: NDArray[A
     around = Surroundings(NOW, "running", path_name="circle")
     message = messages.message(record, around, NOBODY)
     assert message["path"] == {"name": "circle", "progress": 0.25}
+
+
+def test_what_is_touched_and_done_on_a_board(messages: StateMessages, record: NDArray[Any]) -> None:
+    truth, tick_input = record["truth"], record["input"]
+    truth["contact_count"], tick_input["measured_contact"] = 3, 0.75
+    truth["rings_passed"], truth["rings_touched"] = 0b1011, 0b100
+    truth["ball_progress"] = 0.5
+    tick_input["measured_tension"] = (1.0, 2.0, 3.0, 4.0)
+    found = {}
+    for board in ("none", "ring-board", "silicon-arc"):
+        found[board] = messages.message(record, replace(RUNNING, board=board), NOBODY)
+        StateMessage.model_validate(found[board])
+    assert found["none"]["contact"] == {"count": 3, "force_n": 0.75, "limit_n": 2.0}
+    assert found["none"]["tension_n"] == [1.0, 2.0, 3.0, 4.0]
+    assert (found["none"]["rings"], found["none"]["ball"]) == (None, None)
+    assert found["ring-board"]["rings"] == {"passed": 3, "touched": 1, "total": 6}
+    assert found["silicon-arc"]["ball"] == {"progress": 0.5}
+    record["outcome"]["state"]["contact_allowance"] = 2.5
+    assert messages.message(record, RUNNING, NOBODY)["contact"]["limit_n"] == 2.5
+
+
+def test_the_tracker_and_its_correction(messages: StateMessages, record: NDArray[Any]) -> None:
+    off = messages.message(record, RUNNING, NOBODY)["tracker"]
+    assert off == {"on": False, "age_ms": None, "correction_mm": 0.0, "correction_deg": 0.0}
+    record["input"]["settings"]["use_tracker"] = 1
+    record["input"]["tracker"]["sequence"], record["input"]["tracker"]["age_s"] = 5, 0.02
+    record["outcome"]["state"]["correction_position"] = (3e-3, 0.0, 4e-3)
+    record["outcome"]["state"]["correction_rotation"] = (0.0, math.radians(2.0), 0.0)
+    on = messages.message(record, RUNNING, NOBODY)["tracker"]
+    assert on == {"on": True, "age_ms": 20.0, "correction_mm": 5.0, "correction_deg": 2.0}
+
+
+def test_which_robot_it_is(messages: StateMessages, record: NDArray[Any]) -> None:
+    exact = messages.message(record, RUNNING, NOBODY)
+    assert (exact["plant"], exact["preset"], exact["seed"]) == ("kinematic", None, None)
+    physical = messages.message(record, replace(RUNNING, plant="physics"), NOBODY)
+    assert (physical["preset"], physical["seed"]) == ("paper", 1)
 
 
 def test_the_meter_measures_rate_and_real_time_factor(record: NDArray[Any]) -> None:
