@@ -42,7 +42,7 @@ class Recorder:
         self.record["header"]["tick"] = 1
         self.record["input"]["trocar_position"] = configuration.trocar.position_m
         self.record["outcome"]["state"]["safety"] = Safety.ENABLED
-        self.board = configuration.simulation.board
+        self.board: str = configuration.simulation.board
         self.samples: list[Sample] = []
         self.failures = 0
         self.reads = 0
