@@ -5,7 +5,7 @@ For each of the segment's coordinates
     bend = offset + gain * commanded - friction * f
 
 where f, between -1 and 1, is the share of full friction that holds the tendons back: it follows
-their motion in the disks over ``stick`` (Dahl's model of friction). Source: docs/derivations.md;
+their motion in the disks over ``stick``, until they slide. Source: docs/derivations.md;
 paper 1 has neither stretch nor friction.
 """
 
@@ -31,7 +31,7 @@ class Calibration(Section):
         gain: bend over commanded bend.
         offset_rad: bend at a straight command.
         friction_rad: how far full friction holds the bend back.
-        stick_rad: over which motion friction turns around.
+        stick_rad: motion that takes friction from none to full.
         residual_deg: rms of what the model leaves unexplained in the sweep.
         samples: measurements behind it.
         robot: which robot it is of, for people.

@@ -1,13 +1,12 @@
 """Servo commands that make up for the tendons' stretch and friction, as calibrated.
 
 The controller plans bends; what the servos are told is the command that the calibration says will
-give that bend (see :mod:`robot.calibration`). Friction holds with the sign of the motion, and turns
-around over a short way (Dahl); so does what is added for it, and a resting robot keeps what it had.
+give that bend (see :mod:`robot.calibration`). Friction holds against the motion, and turns around
+over a short way in which the tendons stick (Prandtl's elastic-plastic element, one a tendon); so
+does what is added for it, and a resting robot keeps what it had.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -20,16 +19,15 @@ SHARE_RATE = 1.0
 
 
 @compiled
-def friction_after(f: float, moved: float, stick: float) -> float:
-    """Share of full friction after the bend has ``moved`` (rad); Dahl's model, solved exactly.
+def friction_after(f: float, slid: float, stick: float) -> float:
+    """Share of full friction on a tendon after it has ``slid``: elastic until it gives way.
 
     Args:
         f: share before, -1 to 1.
-        moved: motion of the bend, rad.
-        stick: way over which friction turns around, rad.
+        slid: motion in the disks over the pitch radius, rad.
+        stick: motion that takes friction from none to full, rad.
     """
-    goal = 1.0 if moved > 0.0 else -1.0
-    return goal + (f - goal) * math.exp(-abs(moved) / stick)
+    return min(max(f + slid / stick, -1.0), 1.0)
 
 
 @compiled

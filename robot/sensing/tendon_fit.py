@@ -5,14 +5,19 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from robot.compensation import friction_after, held_back, tendon_motion
+from robot.compiled import compiled
 from robot.errors import KeyholeError
 
-STICKS_RAD = np.geomspace(0.005, 0.3, 20)
-"""Ways over which friction may turn around; the best of them is taken."""
 FEWEST_SAMPLES = 50
 LEAST_MOTION_DEG = 30.0
+_NEWTON_STEPS = 6
+_FIRST = np.array([[0.95, 0.95], [0.0, 0.0], [0.02, 0.02], [0.03, 0.03]])
+_LOWEST = np.array([[0.3, 0.3], [-0.4, -0.4], [0.0, 0.0], [0.005, 0.005]])
+_HIGHEST = np.array([[1.4, 1.4], [0.4, 0.4], [0.4, 0.4], [0.5, 0.5]])
+"""Gain, offset, friction and stick of u and v: where the fit starts and what it may not leave."""
 
 
 class SweepTooPoor(KeyholeError):
@@ -46,16 +51,45 @@ def bend_of(axis: np.ndarray) -> np.ndarray:
     return np.column_stack([scale * axis[:, 0], -scale * axis[:, 1]])
 
 
-def _held_back(bends: np.ndarray, stick: float, chord: float) -> np.ndarray:
-    """Shares (n, 2) of full friction that hold u and v back along a history of bends (n, 2)."""
-    shares, slid, friction = np.zeros_like(bends), np.empty(4), np.zeros(4)
-    for k in range(1, len(bends)):
-        (u_before, v_before), (u, v) = bends[k - 1], bends[k]
-        tendon_motion(u_before, v_before, u, v, chord, slid)
+@compiled
+def _predict(
+    told: np.ndarray,
+    gain: np.ndarray,
+    offset: np.ndarray,
+    friction: np.ndarray,
+    stick: np.ndarray,
+    chord: float,
+    out: np.ndarray,
+) -> None:
+    """Bends (n, 2) that the servos' history ``told`` (n, 2) gives.
+
+    The friction depends on the bend and the bend on the friction; Newton's steps solve for both,
+    tick by tick.
+    """
+    shares, slid = np.empty(2), np.empty(4)
+    before, trial = np.zeros(4), np.zeros(4)
+    bend, last = np.zeros(2), np.zeros(2)
+    for k in range(2):
+        last[k] = offset[k] + gain[k] * told[0, k]
+    for row in range(told.shape[0]):
+        bend[:] = last
+        for _ in range(_NEWTON_STEPS):
+            tendon_motion(last[0], last[1], bend[0], bend[1], chord, slid)
+            for i in range(4):
+                trial[i] = friction_after(before[i], slid[i], stick[i % 2])
+            held_back(trial, shares)
+            for k in range(2):
+                free = 0
+                for i in range(k, 4, 2):
+                    free += 1 if abs(trial[i]) < 1.0 else 0
+                slope = 1.0 + 0.5 * free * friction[k] / stick[k]
+                off = bend[k] - offset[k] - gain[k] * told[row, k] + friction[k] * shares[k]
+                bend[k] -= off / slope
+        tendon_motion(last[0], last[1], bend[0], bend[1], chord, slid)
         for i in range(4):
-            friction[i] = friction_after(friction[i], slid[i], stick)
-        held_back(friction, shares[k])
-    return shares
+            before[i] = friction_after(before[i], slid[i], stick[i % 2])
+        last[:] = bend
+        out[row] = bend
 
 
 def fit(told: np.ndarray, seen_at: np.ndarray, seen: np.ndarray, chord: float) -> list[AxisFit]:
@@ -79,18 +113,14 @@ def fit(told: np.ndarray, seen_at: np.ndarray, seen: np.ndarray, chord: float) -
             f"{len(seen)} samples over {least:.0f} deg of bend; at least {FEWEST_SAMPLES} over "
             f"{LEAST_MOTION_DEG:.0f} deg are needed: check the tracker and that the servos move"
         )
-    best: list[AxisFit] = []
-    for stick in STICKS_RAD:
-        shares = _held_back(told, float(stick), chord)[seen_at]
-        fits = [_axis(told[seen_at, k], shares[:, k], seen[:, k], float(stick)) for k in range(2)]
-        best = best or fits
-        best = [min(pair, key=lambda one: one.residual) for pair in zip(best, fits, strict=True)]
-    return best
+    predicted = np.empty_like(told)
 
+    def left(values: np.ndarray) -> np.ndarray:
+        gain, offset, friction, stick = values.reshape(4, 2)
+        _predict(told, gain, offset, friction, stick, chord, predicted)
+        return np.asarray((predicted[seen_at] - seen).T.ravel())
 
-def _axis(told: np.ndarray, share: np.ndarray, seen: np.ndarray, stick: float) -> AxisFit:
-    terms = np.column_stack([np.ones(len(seen)), told, -share])
-    solution = np.linalg.lstsq(terms, seen, rcond=None)[0]
-    left = float(np.sqrt(np.mean((terms @ solution - seen) ** 2)))
-    offset, gain, friction = (float(value) for value in solution)
-    return AxisFit(gain, offset, max(friction, 0.0), stick, left)
+    found = least_squares(left, _FIRST.ravel(), bounds=(_LOWEST.ravel(), _HIGHEST.ravel()))
+    gain, offset, friction, stick = found.x.reshape(4, 2).tolist()
+    rest = np.sqrt(np.mean(left(found.x).reshape(2, -1) ** 2, axis=1)).tolist()
+    return [AxisFit(gain[k], offset[k], friction[k], stick[k], rest[k]) for k in range(2)]
