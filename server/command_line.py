@@ -16,6 +16,7 @@ from server.version import version
 COMMANDS = {
     "console": "server.console_command",
     "run": "server.run_command",
+    "replay": "server.replay_command",
     "bench": "benchmarks.command",
     "states": "server.states_command",
 }

@@ -22,7 +22,7 @@ export function actUnder(id) {
 }
 
 /** Send a request; resolves with the parsed answer, rejects with a Refusal. */
-export async function call(method, path, body) {
+export async function call(method, path, body, timeout_ms = TIMEOUT_MS) {
   const headers = { Accept: "application/json" };
   if (body !== undefined) headers["Content-Type"] = "application/json";
   if (leaseId !== null) headers["X-Keyhole-Lease"] = leaseId;
@@ -35,7 +35,7 @@ export async function call(method, path, body) {
       body: body === undefined ? undefined : JSON.stringify(body),
       credentials: "same-origin",
       cache: "no-store",
-      signal: AbortSignal.timeout(TIMEOUT_MS),
+      signal: AbortSignal.timeout(timeout_ms),
     });
     text = await answer.text();
   } catch (cause) {

@@ -1,6 +1,7 @@
 // The operator page: the stream brings states, every part shows its own share of the newest one.
 
 import { call, ROBOT } from "/assets/api.js";
+import { Boards } from "/assets/boards.js";
 import { byId, setText } from "/assets/dom.js";
 import { startKeys } from "/assets/keys.js";
 import { Motion } from "/assets/motion.js";
@@ -9,12 +10,16 @@ import { Numbers } from "/assets/numbers.js";
 import { showOperator, startOperator, whyNotDriving } from "/assets/operator.js";
 import { Paths } from "/assets/paths.js";
 import { startScene } from "/assets/scene.js";
+import { Recording } from "/assets/recording.js";
+import { Replay } from "/assets/replay.js";
 import { Settings } from "/assets/settings.js";
 import { StateStream } from "/assets/stream.js";
+import { showTask } from "/assets/task.js";
 import { switchTheme } from "/assets/theme.js";
 import { startTooltips } from "/assets/tooltips.js";
 import { showFacts, showSafety } from "/assets/topbar.js";
 import { Traces } from "/assets/traces.js";
+import { Trocar } from "/assets/trocar.js";
 
 const SHOW_MS = 100;
 const LATE_S = 1;
@@ -25,9 +30,13 @@ window.keyhole = { state: null };
 const stream = new StateStream({ onState: take, onLink, onProblem });
 const motion = new Motion(stream, take);
 const settings = new Settings();
-const paths = new Paths();
+const boards = new Boards();
+const paths = new Paths(boards);
+const trocar = new Trocar();
 const traces = new Traces();
 const numbers = new Numbers();
+const recording = new Recording();
+const replay = new Replay();
 let shown = 0;
 let urgent = "";
 let configured = false;
@@ -48,7 +57,7 @@ function take(state) {
 
 /** The answer to a request can overtake a state that is on its way in the stream. */
 const isLate = (state, newest) =>
-  newest !== null && state.time_s < newest.time_s && newest.time_s - state.time_s < LATE_S;
+  newest !== null && !state.replay && state.time_s < newest.time_s && newest.time_s - state.time_s < LATE_S;
 
 function show() {
   const state = window.keyhole.state;
@@ -58,24 +67,30 @@ function show() {
   showSafety(state, stream.up);
   showFacts(state, shown - stream.lastMessage);
   showOperator(state, stream.up);
+  recording.show(state, stream.up);
+  replay.show(state, stream.up);
   showBanner(state);
   settings.show(state, blocked);
   motion.show(state, blocked, stream.up);
   paths.show(state, blocked);
+  boards.show(state, blocked, paths.needed);
+  trocar.show(state, blocked);
+  showTask(state);
   numbers.show(state);
   showLeader(state);
 }
 
-function showLeader({ leader, engaged, plant }) {
+function showLeader({ leader, engaged, plant, preset, seed }) {
   setText(byId("leader"), LEADERS[leader] ?? leader);
   setText(byId("engaged"), engaged ? "· engaged" : "· not engaged");
-  setText(byId("plant"), `· ${plant} robot`);
+  setText(byId("plant"), `· ${plant} robot${preset === null ? "" : `: ${preset}, seed ${seed}`}`);
 }
 
 function onLink(change) {
   showLink(change, window.keyhole.state?.operator.you === true);
   if (change.up) {
     paths.load();
+    boards.load();
     configure();
   }
   show();

@@ -20,6 +20,13 @@ export function fixed(value, places) {
 
 export const percent = (share) => `${Math.round(share * 100)} %`;
 
+/** Seconds as a clock shows them: 0:07.3, 12:30.0. */
+export function clock(seconds) {
+  const tenths = Math.round(seconds * 10);
+  const rest = (tenths % 600) / 10;
+  return `${Math.floor(tenths / 600)}:${rest < 10 ? "0" : ""}${rest.toFixed(1)}`;
+}
+
 /** A reason as a sentence: capital first, full stop last. */
 export function sentence(words) {
   const text = words.trim();

@@ -3,6 +3,7 @@
 import { call, ROBOT } from "/assets/api.js";
 import { byId, onPress, setBlocked, setData, setText } from "/assets/dom.js";
 import { attempt, refuse } from "/assets/notices.js";
+import { REPLAY_WORDS } from "/assets/replay.js";
 
 const REQUESTS = ["enable", "pause", "disable", "reset"];
 
@@ -61,7 +62,8 @@ export class Motion {
       const state = await call("POST", `${ROBOT}/emergency-stop`);
       if (state?.type === "state") this.take(state);
     } catch (refusal) {
-      refuse(`Emergency stop not confirmed: ${refusal.message} Use the stop on the machine.`);
+      if (refusal.code === "only_a_replay") refuse(REPLAY_WORDS);
+      else refuse(`Emergency stop not confirmed: ${refusal.message} Use the stop on the machine.`);
     }
   }
 
@@ -96,7 +98,7 @@ export class Motion {
   show(state, blocked, up) {
     const name = state.safety.state;
     for (const request of REQUESTS) {
-      const open = request === "pause" && up;
+      const open = request === "pause" && up && !state.replay;
       const senseless = SENSELESS[request][name] ?? "";
       setBlocked(byId(request), senseless || (open ? "" : blocked));
       byId(request).classList.toggle("next", NEXT[name] === request && !blocked);

@@ -53,6 +53,10 @@ export class Numbers {
     const right = make("div");
     right.append(title("Servos", "deg"));
     this.servos = servos_deg.map((_, index) => right.appendChild(barRow(`S${index + 1}`, `servo-${index + 1}`)));
+    right.append(title("Tendons", "N"));
+    const tendons = right.appendChild(make("div", "tendons"));
+    tendons.dataset.tip = "Tension of tendons 1 to 4, at the servos";
+    this.tension = servos_deg.map((_, index) => tendons.appendChild(make("span", "", "–", { id: `tension-${index + 1}` })));
     right.append(title("Not met", "per level"));
     this.residuals = RESIDUALS.map(([key, words]) => {
       const row = make("div", "row plain");
@@ -72,6 +76,7 @@ export class Numbers {
     state.joints_deg.forEach((value, index) => showBar(this.joints[index], value, state.joint_limits_deg[index]));
     const range = this.servoRange_deg === null ? null : [-this.servoRange_deg, this.servoRange_deg];
     state.servos_deg.forEach((value, index) => showBar(this.servos[index], value, range));
+    state.tension_n.forEach((value, index) => setText(this.tension[index], fixed(value, 2)));
     RESIDUALS.forEach(([key], index) => setText(this.residuals[index].lastChild, figure(state.residuals[key])));
   }
 

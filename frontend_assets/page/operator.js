@@ -3,6 +3,7 @@
 import { actUnder, call, ROBOT } from "/assets/api.js";
 import { byId, onPress, setBlocked, setData, setHidden, setText } from "/assets/dom.js";
 import { attempt, refuse, tell } from "/assets/notices.js";
+import { REPLAY_WORDS } from "/assets/replay.js";
 
 const KEY = "keyhole-operator";
 
@@ -43,13 +44,14 @@ async function handOver(to) {
 /** Why this page may not drive now, or "". */
 export function whyNotDriving(state, up) {
   if (!up) return "No connection to the server.";
+  if (state.replay) return REPLAY_WORDS;
   if (state.control !== "running") return `Control is ${state.control}.`;
   if (state.operator.you) return "";
   if (state.operator.name) return `${state.operator.name} drives. Ask for a hand over.`;
   return "Take control first.";
 }
 
-export function showOperator({ operator }, up) {
+export function showOperator({ operator, replay }, up) {
   const { name, you } = operator;
   const who = you ? `as ${name}` : name ? `${name} drives` : "No one drives";
   setText(byId("operator-role"), !up ? "Not connected" : you ? "You drive" : "Watching");
@@ -58,7 +60,7 @@ export function showOperator({ operator }, up) {
   setHidden(byId("take-control"), you);
   setHidden(byId("release-control"), !you);
   byId("take-control").classList.toggle("primary", !name);
-  const offline = up ? "" : "No connection to the server.";
+  const offline = !up ? "No connection to the server." : replay ? REPLAY_WORDS : "";
   setBlocked(byId("take-control"), offline);
   setBlocked(byId("release-control"), offline);
   setBlocked(byId("hand-over"), offline || (you ? "" : "Only the one who drives can hand over."));

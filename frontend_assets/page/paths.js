@@ -8,8 +8,11 @@ import { attempt, refuse, tell } from "/assets/notices.js";
 const LARGEST_BYTES = 20e6;
 
 export class Paths {
-  constructor() {
+  /** `boards`: knows which board stands there. */
+  constructor(boards) {
+    this.boards = boards;
     this.titles = new Map();
+    this.boardOf = new Map();
     this.blocked = "";
     onPress(byId("play"), () => this.#play({ experiment: byId("experiment").value }), refuse);
     onPress(byId("stop-path"), () => attempt(call("DELETE", `${ROBOT}/path`)), refuse);
@@ -28,8 +31,10 @@ export class Paths {
     } catch {
       return;
     }
-    for (const { name, title } of experiments) {
+    if (this.titles.size > 0) return;
+    for (const { name, title, board } of experiments) {
       this.titles.set(name, title);
+      this.boardOf.set(name, board);
       byId("experiment").append(make("option", "", title, { value: name }));
     }
     this.#describe();
@@ -39,6 +44,11 @@ export class Paths {
   #describe() {
     const list = byId("experiment");
     setData(list, "tip", `Path to be played from the present pose: ${this.titles.get(list.value)}`);
+  }
+
+  /** Board of the experiment that is chosen. */
+  get needed() {
+    return this.boardOf.get(byId("experiment").value) ?? "none";
   }
 
   async #play(path) {
@@ -67,11 +77,12 @@ export class Paths {
     });
   }
 
-  show({ path, safety }, blocked) {
+  show({ path, safety, board }, blocked) {
     const asleep = safety.state === "ENABLED" ? "" : "Enable the robot first.";
     const running = path ? "A path is playing. Stop it first." : "";
     this.blocked = blocked || asleep || running;
-    setBlocked(byId("play"), this.blocked || (this.titles.size ? "" : "No experiments were listed."));
+    const listed = this.titles.size ? "" : "No experiments were listed.";
+    setBlocked(byId("play"), this.boards.why(this.needed, board) || this.blocked || listed);
     setBlocked(byId("stop-path"), blocked || (path ? "" : "No path is playing."));
     byId("path-progress").value = path?.progress ?? 0;
     const name = this.titles.get(path?.name) ?? path?.name ?? "Path";

@@ -3,6 +3,7 @@
 
 import { call, ROBOT } from "/assets/api.js";
 import { byId, onPress, setBlocked, setText, setUnusable } from "/assets/dom.js";
+import { figure, fixed } from "/assets/format.js";
 import { refuse, tell } from "/assets/notices.js";
 import { viewOrientation } from "/assets/scene.js";
 
@@ -27,6 +28,8 @@ export class Settings {
     for (const key of ["solver", "coordinates"]) {
       byId(key).addEventListener("change", () => this.#put("priority", key, byId(key).value));
     }
+    byId("compensation").addEventListener("change", () => this.#put("compensation", "mode", byId("compensation").value));
+    byId("tracker").addEventListener("change", () => this.#put("compensation", "tracker", byId("tracker").checked));
     byId("motion-scale").addEventListener("input", () => this.#slide());
     byId("motion-scale").addEventListener("dblclick", () => this.#setScale(1));
     onPress(byId("align-view"), () => this.#alignView(), refuse);
@@ -113,7 +116,16 @@ export class Settings {
     this.#showScale(motion_scale);
   }
 
-  show({ priority, teleoperation }, blocked) {
+  #showInstrument({ compensation, tracker }) {
+    const list = byId("compensation");
+    if (this.#isFree("mode") && document.activeElement !== list) list.value = compensation;
+    if (this.#isFree("tracker")) byId("tracker").checked = tracker.on;
+    const seen = tracker.age_ms === null ? "No sample of a tracker" : `Newest sample ${fixed(tracker.age_ms, 0)} ms old`;
+    const correction = `corrects by ${figure(tracker.correction_mm)} mm, ${figure(tracker.correction_deg)} deg`;
+    setText(byId("tracker-words"), tracker.on ? `${seen}; ${correction}` : seen);
+  }
+
+  show({ priority, teleoperation, compensation, tracker }, blocked) {
     for (const [id, key] of Object.entries(SWITCHES)) {
       if (this.#isFree(key)) byId(id).checked = teleoperation[key];
     }
@@ -123,6 +135,7 @@ export class Settings {
       if (this.#isFree(key) && document.activeElement !== byId(key)) byId(key).value = priority[key];
     }
     this.#showRange(teleoperation);
+    this.#showInstrument({ compensation, tracker });
     for (const input of document.querySelectorAll("input.drive, select.drive")) setUnusable(input, blocked);
     if (!blocked && priority.solver === "hqp") setUnusable(byId("coordinates"), "The QP always uses u, v.");
     setBlocked(byId("align-view"), blocked);

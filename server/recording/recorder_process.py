@@ -109,16 +109,18 @@ class Recorder:
                 self._directory.configuration(),
                 self._directory.calibration(),
                 clock="host",
-                plant=self._plant(),
+                plant=self._told("plant"),
+                board=self._told("board"),
             )
         except KeyholeError as error:
             self._fail(error)
             return
         self._state, self._flushed = RecordingState.RECORDING, time.monotonic()
 
-    def _plant(self) -> str:
+    def _told(self, name: str) -> str:
+        """What control says of itself; empty while it has not spoken."""
         with contextlib.suppress(MappedReadError):
-            return str(self._control.read()[0]["plant"].decode(errors="replace"))
+            return str(self._control.read()[0][name].decode(errors="replace"))
         return ""
 
     def _guarded(self, act: Callable[[], None]) -> None:

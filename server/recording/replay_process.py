@@ -112,7 +112,8 @@ class Replay:
         """Say what stands here instead of a control process."""
         said = np.zeros(1, STATUS)
         said["phase"], said["pid"] = int(Phase.RUNNING), os.getpid()
-        said["plant"] = self._recording.metadata.get("plant", "").encode()[:32] or b"recorded"
+        said["plant"] = self._recording.metadata.get("plant", "").encode()
+        said["board"] = self._recording.metadata.get("board", "").encode()
         said["realtime"], said["message"] = b"replay", b"shows a recording"
         said["rate_hz"], said["stamp_ns"] = 1.0 / _PERIOD_S, time.monotonic_ns()
         self._control.write(said)

@@ -76,7 +76,8 @@ class RecordingWriter:
         calibration: what it was calibrated with; None without.
         clock: ``plant`` counts times from now by the plant's own clock, as for a run that goes as
             fast as it can; ``host`` takes the times at which the records were published.
-        plant: name of the plant, for people.
+        plant: name of the plant, and board: of what stands before it, where they are not those of
+            the configuration.
 
     Attributes:
         size: bytes written so far.
@@ -97,6 +98,7 @@ class RecordingWriter:
         *,
         clock: Literal["plant", "host"] = "plant",
         plant: str = "",
+        board: str = "",
     ) -> None:
         rate_hz = configuration.control.rate_hz
         self.path = Path(path)
@@ -117,10 +119,12 @@ class RecordingWriter:
         self._synchronised = time.monotonic()
         self._closed = False
         self._file = McapFile(self.path, f"keyhole {version()}")
-        self._describe(configuration, calibration, plant)
+        simulation = configuration.simulation
+        names = {"plant": plant or simulation.plant, "board": board or simulation.board}
+        self._describe(configuration, calibration, names)
 
     def _describe(
-        self, configuration: Configuration, calibration: BaseModel | None, plant: str
+        self, configuration: Configuration, calibration: BaseModel | None, names: dict[str, str]
     ) -> None:
         file, now_ns = self._file, self._started_ns
         file.add_metadata(
@@ -129,7 +133,7 @@ class RecordingWriter:
                 "recording_version": str(RECORDING_VERSION),
                 "record_schema_version": str(SCHEMA_VERSION),
                 "robot": "instrument",
-                "plant": plant,
+                **names,
                 "configuration_hash": f"{configuration.hash64():016x}",
                 "started": datetime.fromtimestamp(now_ns * 1e-9, UTC).isoformat(),
                 "clock": self._clock,

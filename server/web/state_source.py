@@ -166,7 +166,8 @@ class StateSource:
         elif now - int(record["header"]["stamp_ns"][0]) > SILENT_NS:
             control, words = "down", "control has stopped publishing"
         path_id = 0 if record is None else int(record["header"]["path_id"][0])
-        rate_hz, factor = self._meter.measure()
+        # The rate at which a recording is shown says nothing about a loop.
+        rate_hz, factor = self._meter.measure() if self._replay is None else (None, None)
         return Surroundings(
             now_ns=now,
             control=control,

@@ -1,0 +1,39 @@
+// Over the scene: what the instrument touches, and what has been done on the board.
+
+import { byId, setData, setHidden, setText } from "/assets/dom.js";
+import { fixed, percent } from "/assets/format.js";
+
+const NEAR = 0.75;
+
+export function showTask({ contact, rings, ball, control }) {
+  const known = control === "running";
+  setHidden(byId("task"), !known);
+  if (!known) return;
+  const level = levelOf(contact);
+  setData(byId("contact"), "level", level);
+  setText(byId("contact-text"), wordsOf(contact, level));
+  setHidden(byId("rings"), rings === null);
+  if (rings) {
+    const touched = rings.touched ? ` · ${rings.touched} touched` : "";
+    setText(byId("rings"), `Rings ${rings.passed} of ${rings.total}${touched}`);
+  }
+  setHidden(byId("ball"), ball === null);
+  if (ball) {
+    setText(byId("ball-text"), `Ball ${percent(ball.progress ?? 0)} of the groove`);
+    byId("ball-progress").value = ball.progress ?? 0;
+  }
+}
+
+function levelOf({ count, force_n, limit_n }) {
+  if (force_n > limit_n) return "over";
+  if (force_n > NEAR * limit_n) return "near";
+  return count > 0 || force_n > 0.005 ? "touch" : "none";
+}
+
+function wordsOf({ force_n, limit_n }, level) {
+  const force = `${fixed(force_n, 2)} N`;
+  if (level === "none") return "No contact";
+  if (level === "touch") return `Contact ${force}`;
+  const limit = `${fixed(limit_n, 1)} N`;
+  return level === "near" ? `Contact ${force}, near the limit of ${limit}` : `Contact ${force}, above the limit of ${limit}`;
+}
