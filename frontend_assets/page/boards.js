@@ -9,7 +9,7 @@ const CHANGE_MS = 8000;
 export class Boards {
   constructor() {
     this.titles = new Map();
-    this.needed = "none";
+    this.needed = null;
     this.changing = false;
     byId("board").addEventListener("change", () => this.#change(byId("board").value));
     onPress(byId("board-switch"), () => this.#change(this.needed), refuse);
@@ -37,7 +37,8 @@ export class Boards {
 
   /** Why an experiment on the board `needed` cannot start while `present` stands there, or "". */
   why(needed, present) {
-    if (needed === "none" || needed === present) return "";
+    if (needed === null || needed === present) return "";
+    if (needed === "none") return "This experiment needs room. Disable the robot and take the board away.";
     return `This experiment is made for “${this.title(needed)}”. Disable the robot and put it there.`;
   }
 
@@ -59,7 +60,8 @@ export class Boards {
     setData(list, "tip", `Board in front of the robot: ${this.title(board)}`);
     const other = this.why(needed, board) !== "";
     setHidden(byId("board-offer"), !other);
-    if (other) setText(byId("board-needed"), `Made for “${this.title(needed)}”`);
+    const made = needed === "none" ? "Needs room: no board" : `Made for “${this.title(needed)}”`;
+    if (other) setText(byId("board-needed"), made);
     setBlocked(byId("board-switch"), why);
   }
 }

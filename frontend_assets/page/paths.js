@@ -48,7 +48,7 @@ export class Paths {
 
   /** Board of the experiment that is chosen. */
   get needed() {
-    return this.boardOf.get(byId("experiment").value) ?? "none";
+    return this.boardOf.get(byId("experiment").value) ?? null;
   }
 
   async #play(path) {

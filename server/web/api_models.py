@@ -216,7 +216,14 @@ class ExperimentEntry(BaseModel):
     name: str
     title: str
     duration_s: float = Field(description="Length in s.")
-    board: str = Field(description="Board that must stand there; none for any.")
+    board: str | None = Field(
+        description="Board that must stand there: null for any, none where there must be room."
+    )
+    arm_locked: bool = Field(description="Whether the arm stands still meanwhile.")
+    cases: list[str] = Field(description="Priority cases under which the paper runs it.")
+    marks_s: list[float] = Field(
+        description="Times that matter: over a peg, half-way through a ring, bend before direction."
+    )
 
 
 class BoardEntry(BaseModel):

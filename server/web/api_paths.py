@@ -15,6 +15,7 @@ from server.web.refusals import BoardNeeded
 from server.web.services import Operator, ServicesHere
 
 if TYPE_CHECKING:
+    from scenes.experiments import Experiment
     from scenes.path import Path
 
 router = APIRouter(prefix=ROBOT, tags=["paths"])
@@ -26,22 +27,35 @@ def list_experiments(configuration: Configuration) -> list[ExperimentEntry]:
 
     found = [experiments.experiment(name, configuration) for name in experiments.names()]
     return [
-        ExperimentEntry(name=one.name, title=one.title, duration_s=one.duration_s, board=one.board)
+        ExperimentEntry(
+            name=one.name,
+            title=one.title,
+            duration_s=one.duration_s,
+            board=_board_of(one),
+            arm_locked=one.lock_arm,
+            cases=list(one.cases),
+            marks_s=list(one.marks),
+        )
         for one in found
     ]
 
 
-def _wanted(body: PathStart, configuration: Configuration) -> tuple[Path, str, bool]:
-    """The path, the board that it needs (``none`` for any), and whether the arm stands still."""
+def _board_of(experiment: Experiment) -> str | None:
+    """Name of the board that must stand there; None where any may."""
+    return experiment.board if experiment.board != "none" or experiment.needs_room else None
+
+
+def _wanted(body: PathStart, configuration: Configuration) -> tuple[Path, str | None, bool]:
+    """The path, the board that it needs (None for any), and whether the arm stands still."""
     if body.csv is not None:
         from scenes.path_file import parse_csv
 
-        return parse_csv(body.csv, body.name), "none", False
+        return parse_csv(body.csv, body.name), None, False
     from scenes import experiments
 
     assert body.experiment is not None
     found = experiments.experiment(body.experiment, configuration)
-    return found.path, found.board, found.lock_arm
+    return found.path, _board_of(found), found.lock_arm
 
 
 @router.get("/experiments", summary="The experiments that can be played")
@@ -59,7 +73,7 @@ async def start_path(body: PathStart, services: ServicesHere, caller: Operator) 
     path, needed, locks_arm = await asyncio.to_thread(_wanted, body, services.configuration)
     services.lease.check(caller)
     present = str(services.link.status()["board"])
-    if needed not in ("none", present):
+    if needed is not None and needed != present:
         raise BoardNeeded(path.name, needed, present)
     services.target.clear()
     await services.requests.start_path(path.samples, path.name, locks_arm)

@@ -12,6 +12,7 @@ import pytest
 
 from robot.records import RECORD, Safety
 from robot.safety import TRANSITIONS
+from scenes import experiments
 from server.memory.link_records import RECORD_RING_FILE
 from server.memory.mapped import MappedRing
 from server.web.state_schema import StateMessage
@@ -155,8 +156,12 @@ def test_settings_sent_at_once_do_not_undo_each_other(operator: ApiClient) -> No
 
 
 def test_an_experiment_plays_and_stops(driver: ApiClient) -> None:
-    names = [one["name"] for one in driver.call("GET", "/experiments").json()]
-    assert names == ["circle", "circle-yz", "square", "circle-infeasible"]
+    listed = {one["name"]: one for one in driver.call("GET", "/experiments").json()}
+    assert list(listed) == list(experiments.names())
+    assert listed["ring-board"]["board"] == "ring-board"
+    assert len(listed["ring-board"]["marks_s"]) >= 6
+    assert (listed["circle"]["board"], listed["circle"]["arm_locked"]) == (None, False)
+    assert (listed["arc"]["board"], listed["arc"]["arm_locked"]) == ("none", True)
     state = driver.done("POST", "/path", {"experiment": "circle"})
     assert state["path"]["name"] == "circle"
     playing = driver.until(lambda s: s["path"]["progress"] > 0.02, "the path goes on")
@@ -165,6 +170,24 @@ def test_an_experiment_plays_and_stops(driver: ApiClient) -> None:
     stopped = driver.done("DELETE", "/path")
     assert stopped["path"] is None
     assert driver.until(lambda s: not s["engaged"], "at rest")["safety"]["state"] == "ENABLED"
+
+
+def test_the_arm_stands_still_while_the_arc_plays(operator: ApiClient) -> None:
+    before = operator.state()
+    operator.done("PUT", "/board", {"name": "pegboard"})
+    operator.done("POST", "/enable")
+    refusal = operator.refused("POST", "/path", {"experiment": "arc"})
+    assert (refusal["code"], refusal["needed"]) == ("board_needed", "none")
+    operator.done("POST", "/disable")
+    operator.done("PUT", "/board", {"name": "none"})
+    operator.done("POST", "/enable")
+    operator.done("POST", "/path", {"experiment": "arc"})
+    bent = operator.until(lambda s: s["path"]["progress"] > 0.15, "the segment moves")
+    assert bent["joints_deg"] == pytest.approx(before["joints_deg"], abs=1e-6)
+    assert abs(bent["bend_deg"] - before["bend_deg"]) > 1.0
+    operator.done("DELETE", "/path")
+    operator.done("POST", "/disable")
+    operator.done("PUT", "/board", {"name": before["board"]})
 
 
 def test_a_path_from_csv_plays_to_its_end(driver: ApiClient) -> None:
