@@ -17,6 +17,8 @@ COMMANDS = {
     "console": "server.console_command",
     "run": "server.run_command",
     "replay": "server.replay_command",
+    "study": "server.study_command",
+    "report": "server.report_command",
     "bench": "benchmarks.command",
     "states": "server.states_command",
 }

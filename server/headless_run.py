@@ -10,12 +10,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hardware.choose import make_plant
+from robot.calibration import Calibration
 from robot.configuration import Configuration
 from robot.instrument_robot import InstrumentRobot
 from robot.priority.limits import describe, speed_violations, violations
 from robot.records import Request, Safety
 from robot.safety import REASONS, Event
 from robot.segment import polar
+from scenes.lead_in import anchored
+from scenes.path import Path
+from server.calibration import calibration_for
 from server.control.loop import ControlLoop
 from server.run_options import RunOptions, check_names
 
@@ -107,16 +111,26 @@ class HeadlessRun:
 
     Attributes:
         configuration: the one in force, with the options in it.
+        calibration: the one in force.
         steps: ticks of the path.
         dt_s: length of a tick.
     """
 
-    def __init__(self, configuration: Configuration, options: RunOptions) -> None:
+    def __init__(
+        self,
+        configuration: Configuration,
+        options: RunOptions,
+        calibration: Calibration | None = None,
+        progress: Callable[[float], None] = lambda _: None,
+    ) -> None:
         """Build everything.
 
         Args:
             configuration: what the options leave open.
             options: what to run.
+            calibration: of the robot's tendons; without one the robot is calibrated first, if its
+                tendons are to be compensated.
+            progress: called with the share of that which is done.
 
         Raises:
             KeyholeError: a name is unknown, or the start cannot be reached.
@@ -124,11 +138,11 @@ class HeadlessRun:
         check_names(options)
         self.options = options
         self.configuration = configuration = options.applied(configuration)
-        self._robot = InstrumentRobot(configuration)
+        self.calibration = calibration or calibration_for(configuration, progress)
+        self._robot = InstrumentRobot(configuration, self.calibration)
         x = self._robot.initial_state()["x"][0]
         self._plant = make_plant(configuration, x)
         self._loop = ControlLoop(self._robot, self._plant, configuration)
-        self._loop.settings["lock_arm"] = options.lock_arm
         self.steps = math.ceil(options.path.duration_s * configuration.control.rate_hz) + 1
         self.dt_s = 1.0 / configuration.control.rate_hz
 
@@ -176,8 +190,10 @@ class HeadlessRun:
         result = self._empty()
         held_back: dict[str, int] = {}
         pace = _Pace(self.dt_s) if self.options.realtime else None
-        loop.start_path(self.options.path)
+        path, way_in_s = self._path_from_here()
+        loop.start_path(path, lock_arm=self.options.lock_arm)
         done, started = 0, time.perf_counter()
+        left = round(way_in_s / self.dt_s)
         while loop.path is not None and done < self.steps:
             loop.step()
             if record is not None:
@@ -186,8 +202,13 @@ class HeadlessRun:
             if state["safety"] != Safety.ENABLED:
                 result.ended = REASONS[Event(int(state["reason"]))][0]
                 break
+            if left > 0:
+                left -= 1
+                continue
             self._take_down(done, result, held_back)
             done += 1
+            if done == 1:  # the first tick may have to load compiled functions
+                started = time.perf_counter()
             if done % 100 == 0:
                 progress(done / self.steps)
             if interrupted():
@@ -195,13 +216,33 @@ class HeadlessRun:
                 break
             if pace is not None:
                 pace.wait()
-        result.realtime_factor = done * self.dt_s / (time.perf_counter() - started)
+        passed = max(done - 1, 0) * self.dt_s
+        result.realtime_factor = passed / max(time.perf_counter() - started, 1e-9)
         result.trace, result.errors = result.trace[:done], result.errors[:done]
         result.detail, result.tick_ns = result.detail[:done], result.tick_ns[:done]
         result.limits = {
             words: round(count / done, 4) for words, count in sorted(held_back.items())
         }
         return result
+
+    def _path_from_here(self) -> tuple[Path, float]:
+        """The path, and how long the way in to its start takes, s, before errors count.
+
+        What stands where the configuration's start is (boards) has to be met from there. The exact
+        plant is there already.
+        """
+        path = self.options.path
+        if not self.options.from_start or self.configuration.simulation.plant == "kinematic":
+            return path, 0.0
+        here = self._loop.record["outcome"]["state"][0]
+        start = self._robot.initial_state()[0]
+        return anchored(
+            path,
+            start["tip_position"],
+            start["tip_rotation"],
+            here["desired_position"],
+            here["desired_rotation"],
+        )
 
     def _empty(self) -> RunResult:
         return RunResult(

@@ -34,14 +34,14 @@ def bar(title: str, share: float, elapsed_s: float) -> str:
 class ProgressBar:
     """Draws on stderr where somebody looks, and nothing elsewhere.
 
-    Args:
+    Attributes:
         title: what is being done.
     """
 
     _EVERY_S = 0.1
 
     def __init__(self, title: str) -> None:
-        self._title = title
+        self.title = title
         self._drawn = 0
         self._seen = sys.stderr.isatty()
         self._started = time.monotonic()
@@ -53,7 +53,7 @@ class ProgressBar:
         if not self._seen or (now - self._newest < self._EVERY_S and share < 1.0):
             return
         self._newest = now
-        line = bar(self._title, share, now - self._started)
+        line = bar(self.title, share, now - self._started)
         print(f"\r{line:<{self._drawn}}", end="", file=sys.stderr, flush=True)
         self._drawn = len(line)
 

@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from robot.calibration import Calibration
 from robot.configuration import Configuration
 from robot.errors import KeyholeError
 from robot.priority.levels import CASE_NAMES
@@ -19,6 +20,7 @@ from server.control.loop import COORDINATE_NAMES, SOLVER_NAMES
 from server.figure_table import printed
 from server.headless_run import TRACE_COLUMNS, HeadlessRun, RunResult
 from server.progress_bar import ProgressBar
+from server.recording.writer import RecordingWriter
 from server.run_figures import result_document
 from server.run_options import (
     COMPENSATIONS,
@@ -56,6 +58,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--seconds", type=positive, metavar="S", help="play only the first S seconds of the path"
     )
+    parser.add_argument(
+        "--calibration", metavar="FILE", help="of the robot, instead of calibrating it first"
+    )
+    parser.add_argument("--record", metavar="FILE", help="record every tick to a new MCAP file")
     parser.add_argument("--realtime", action="store_true", help="paced by the wall clock")
     parser.add_argument("--config", metavar="FILE", help="configuration (TOML)")
     parser.add_argument("--json", metavar="FILE", help="write the figures as JSON (- for stdout)")
@@ -107,14 +113,15 @@ def execute(arguments: argparse.Namespace) -> int:
     runs = _all(arguments, configuration) if many else [_one(arguments, configuration)]
     _check_writable(arguments.json)
     _check_writable(arguments.trace)
+    calibration = given_calibration(arguments.calibration)
     documents: list[dict[str, Any]] = []
     with StopSignals() as stopped:
         for place, options in enumerate(runs, 1):
             title = options.experiment + (f", case {options.case} ({place}/{len(runs)})" * many)
-            run = HeadlessRun(configuration, options)
-            bar = ProgressBar(title)
-            result = run.execute(bar, stopped.received)
-            bar.end()
+            sweeping = ProgressBar("calibrating")
+            run = HeadlessRun(configuration, options, calibration, sweeping)
+            sweeping.end()
+            result = _play(run, title, stopped, arguments.record)
             documents.append(result_document(run.configuration, options, result))
             if arguments.trace:
                 _write_trace(arguments.trace, result)
@@ -122,6 +129,27 @@ def execute(arguments: argparse.Namespace) -> int:
                 break
     _tell(documents if many else documents[0], arguments.json)
     return 0 if all(document["ended"] == "completed" for document in documents) else 1
+
+
+def given_calibration(file: str | None) -> Calibration | None:
+    """The calibration in ``file``; None without a file."""
+    if file is None:
+        return None
+    from server.calibration_file import load_calibration
+
+    return load_calibration(file)
+
+
+def _play(run: HeadlessRun, title: str, stopped: StopSignals, record: str | None) -> RunResult:
+    """Play it, with a bar, and record it if ``record`` names a file."""
+    bar = ProgressBar(title)
+    if record is None:
+        result = run.execute(bar, stopped.received)
+    else:
+        with RecordingWriter(record, run.configuration, run.calibration) as writer:
+            result = run.execute(bar, stopped.received, writer.append)
+    bar.end()
+    return result
 
 
 def _tell(found: dict[str, Any] | list[dict[str, Any]], file: str | None) -> None:
@@ -177,8 +205,11 @@ def _one(arguments: argparse.Namespace, configuration: Configuration) -> RunOpti
 
 def _all(arguments: argparse.Namespace, configuration: Configuration) -> list[RunOptions]:
     """Every experiment for every case it lists, or for the one that is asked for."""
-    if arguments.trace:
-        raise RunArgumentError(f"--trace is of one run; name an experiment instead of {ALL!r}")
+    for option in ("trace", "record"):
+        if getattr(arguments, option):
+            raise RunArgumentError(
+                f"--{option} is of one run; name an experiment instead of {ALL!r}"
+            )
     runs = []
     for name in names():
         found = experiment(name, configuration)

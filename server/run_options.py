@@ -38,6 +38,8 @@ class RunOptions:
         compensation: how stretch and friction of the tendons are met.
         lock_arm: whether the arm stands still.
         realtime: whether the wall clock paces the run.
+        from_start: whether the path begins at the configuration's start, as boards want it, rather
+            than where the tip is.
         marks: times of the path that matter, s (see :class:`scenes.experiments.Experiment`).
     """
 
@@ -54,6 +56,7 @@ class RunOptions:
     compensation: str | None = None
     lock_arm: bool = False
     realtime: bool = False
+    from_start: bool = False
     marks: tuple[float, ...] = ()
 
     def applied(self, configuration: Configuration) -> Configuration:
@@ -118,6 +121,7 @@ def options_for(
         "coordinates": priority.coordinates,
         "board": experiment.board,
         "lock_arm": experiment.lock_arm,
+        "from_start": True,
         "marks": experiment.marks,
     }
     return RunOptions(experiment=experiment.name, case=case, **(fields | more))

@@ -1,0 +1,1 @@
+"""Studies: many headless runs on all cores or a cluster, resumable."""

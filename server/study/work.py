@@ -1,0 +1,113 @@
+"""One task, carried out wherever it is sent: everything it needs travels with it."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from robot.calibration import Calibration
+from robot.configuration import Configuration
+from robot.errors import KeyholeError
+from server.headless_run import HeadlessRun, RunResult
+from server.run_figures import result_document
+from server.study.program_mark import program_mark
+from server.study.task import Task
+from server.version import version
+
+_TRACE_PERIOD_S = 0.02
+_one_at_a_time = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Work:
+    """A task with what it is done under.
+
+    Attributes:
+        task: what to run.
+        name: of its files.
+        configuration: JSON of the study's configuration.
+        calibration: JSON of the calibration that is given, or None to calibrate where it is needed.
+        program: mark of the Keyhole that asks.
+    """
+
+    task: Task
+    name: str
+    configuration: str
+    calibration: str | None
+    program: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of it.
+
+    Attributes:
+        document: the run's figures; None if it was interrupted or failed.
+        trace: a compressed ``.npz`` (see :func:`packed_trace`).
+        failure: why there are no figures, or empty.
+    """
+
+    document: dict[str, Any] | None
+    trace: bytes = b""
+    failure: str = ""
+
+
+def perform(work: Work, interrupted: Callable[[], bool] = lambda: False) -> Outcome:
+    """Do it.
+
+    Args:
+        work: what to do.
+        interrupted: asked every tick whether to stop.
+    """
+    if work.program != program_mark():
+        return Outcome(None, failure="the worker's Keyhole is not the same as this one")
+    # A cluster's worker may have threads; a run is not made to share a process with another.
+    with _one_at_a_time:
+        try:
+            return _run(work, interrupted)
+        except KeyholeError as error:
+            return Outcome(None, failure=" ".join(str(error).split()))
+
+
+def _run(work: Work, interrupted: Callable[[], bool]) -> Outcome:
+    configuration = Configuration.model_validate_json(work.configuration)
+    given = work.calibration
+    calibration = None if given is None else Calibration.model_validate_json(given)
+    options = work.task.options(configuration)
+    run = HeadlessRun(configuration, options, calibration)
+    result = run.execute(lambda _: None, interrupted)
+    if result.ended == "interrupted":
+        return Outcome(None)
+    trace = packed_trace(result, run.dt_s)
+    document = result_document(run.configuration, options, result)
+    document["keyhole"] = version()
+    document["trace_sha256"] = hashlib.sha256(trace).hexdigest()
+    return Outcome(document, trace)
+
+
+def packed_trace(result: RunResult, dt_s: float) -> bytes:
+    """A ``.npz`` of a row every 20 ms, single precision.
+
+    It holds ``trace``, ``detail`` and ``errors`` of a :class:`server.headless_run.RunResult`. Equal
+    results give equal bytes.
+
+    Args:
+        result: what came of the run.
+        dt_s: length of a tick.
+    """
+    every = max(1, math.floor(_TRACE_PERIOD_S / dt_s + 0.5))
+    packed = io.BytesIO()
+    np.savez_compressed(
+        packed,
+        trace=result.trace[::every].astype(np.float32),
+        detail=result.detail[::every].astype(np.float32),
+        errors=result.errors[::every].astype(np.float32),
+    )
+    return packed.getvalue()
