@@ -16,6 +16,7 @@ from server.version import version
 COMMANDS = {
     "console": "server.console_command",
     "run": "server.run_command",
+    "calibrate": "server.calibrate_command",
     "replay": "server.replay_command",
     "study": "server.study_command",
     "report": "server.report_command",

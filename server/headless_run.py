@@ -204,9 +204,9 @@ class HeadlessRun:
                 break
             if left > 0:
                 left -= 1
-                continue
-            self._take_down(done, result, held_back)
-            done += 1
+            else:
+                self._take_down(done, result, held_back)
+                done += 1
             if done == 1:  # the first tick may have to load compiled functions
                 started = time.perf_counter()
             if done % 100 == 0:

@@ -174,8 +174,8 @@ class ControlLoop:
         With ``lock_arm`` the arm stands still as long as it plays.
         """
         self._path, self._path_time_ns, self._path_locks_arm = path, 0, lock_arm
-        self._path_start_position[:] = self._state["tip_position"][0]
-        self._path_start_rotation[:] = self._state["tip_rotation"][0]
+        self._path_start_position[:] = self._state["desired_position"][0]
+        self._path_start_rotation[:] = self._state["desired_rotation"][0]
         self._header["path_id"] = path_id
         self._header["path_progress"] = 0.0
 

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robot.calibration import Calibration
 from robot.configuration import Configuration
 from robot.errors import KeyholeError
 from server.control.lifeline import Lifeline
@@ -101,6 +102,11 @@ def _run(directory: RunDirectory, configuration: Configuration, lifeline: Lifeli
     status.say(Phase.STARTING, "compiling the controller (only after an update)")
     robot = InstrumentRobot(configuration)
     warm_up(robot, configuration)
+    calibration = directory.calibration()
+    if calibration is None:
+        calibration = _calibration(configuration, status)
+        directory.write_calibration(calibration)
+    robot = InstrumentRobot(configuration, calibration)
     start = robot.initial_state()["x"][0]
     plant = make_plant(configuration, start)
     try:
@@ -115,6 +121,24 @@ def _run(directory: RunDirectory, configuration: Configuration, lifeline: Lifeli
         return drive(runner, status)
     finally:
         plant.close()
+
+
+def _calibration(configuration: Configuration, status: Status) -> Calibration:
+    """The calibration that is kept for this robot; a simulated one is calibrated where none is."""
+    from server.calibration import calibration_for
+    from server.calibration_file import CalibrationFileError, default_path, load_if_there, save
+
+    path = default_path(configuration)
+    kept = load_if_there(path)
+    if kept is not None:
+        return kept
+    status.say(Phase.STARTING, "calibrating the tendons (a few seconds, once)")
+    # Made whatever the mode is now: it may be chosen later.
+    full = configuration.compensation.model_copy(update={"mode": "full"})
+    made = calibration_for(configuration.model_copy(update={"compensation": full}))
+    with contextlib.suppress(CalibrationFileError):
+        save(path, made)
+    return made
 
 
 def drive(runner: ControlRunner, status: Status) -> int:
