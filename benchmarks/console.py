@@ -40,7 +40,9 @@ class Console:
     Args:
         directory: its run directory.
         config: configuration file; None for the default.
-        arguments: more arguments of ``keyhole console``.
+        arguments: more arguments of the command.
+        command: it, and what stands before its options.
+        environment: variables beside those of this process.
 
     Attributes:
         process: the supervisor.
@@ -49,22 +51,30 @@ class Console:
     """
 
     def __init__(
-        self, directory: Path, config: str | None = None, arguments: tuple[str, ...] = ()
+        self,
+        directory: Path,
+        config: str | None = None,
+        arguments: tuple[str, ...] = (),
+        *,
+        command: tuple[str, ...] = ("console",),
+        environment: dict[str, str] | None = None,
     ) -> None:
         self.directory = directory
+        self._command, self._environment = command, environment or {}
         options = ["--config", config] if config else []
         self._arguments = [*options, *arguments]
         self._errors = directory.with_name(f"{directory.name}.stderr")
         self._lease = self._trouble = ""
 
     def __enter__(self) -> Self:
-        fixed = ["console", "--no-browser", "--port", "0", "--run-directory", str(self.directory)]
+        place = ["--run-directory", str(self.directory)]
+        fixed = [*self._command, "--no-browser", "--port", "0", *place]
         with self._errors.open("wb") as errors:
             self.process = subprocess.Popen(
                 module_command("server.command_line", [*fixed, *self._arguments]),
                 stdout=subprocess.PIPE,
                 stderr=errors,
-                env=module_environment(),
+                env={**module_environment(), **self._environment},
             )
         assert self.process.stdout is not None
         line = self.process.stdout.readline().decode()

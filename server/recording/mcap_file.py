@@ -77,6 +77,9 @@ class McapFile:
         self._compressor = zstandard.ZstdCompressor(level=1, write_content_size=True)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
+        except (OSError, ValueError) as error:
+            raise RecordingNotWritten(path, f"cannot be made: {_words(error)}") from None
+        try:
             flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
             self._descriptor = os.open(path, flags, 0o644)
         except FileExistsError:

@@ -23,7 +23,10 @@ def understand(description: bytes) -> np.dtype[Any]:
         ValueError: it is no such description.
     """
     try:
-        return np.dtype(_fields(json.loads(description)))
+        described = json.loads(description)
+        if not isinstance(described, list) or not described:
+            raise ValueError("no description of a numpy type")
+        return np.dtype(_fields(described))
     except (TypeError, IndexError, KeyError) as error:
         raise ValueError(f"no description of a numpy type: {error}") from None
 

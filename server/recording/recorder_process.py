@@ -62,6 +62,7 @@ class Recorder:
         self._state = RecordingState.IDLE
         self._message = ""
         self._written: Path | None = None
+        self._awaited: Path | None = None
         self._counts, self._duration_ns = (0, 0, 0, 0, 0), 0
         before = read_status(self._status)
         self._answered = before.answered
@@ -75,14 +76,17 @@ class Recorder:
         if before.state == RecordingState.FAILED:
             self._state = RecordingState.FAILED
             return
-        self._start(following(before.path), before.next_sequence)
-        if self._state == RecordingState.RECORDING:
+        path = following(before.path)
+        self._start(path, before.next_sequence)
+        if self._state == RecordingState.RECORDING and path != before.path:
             self._message = f"the recorder was started again; the part before is {before.path.name}"
 
     def step(self) -> None:
         """Follow what is asked, and write what has come; called some twenty times a second."""
         if self._request.sequence != self._answered:
             self._follow()
+        if self._awaited is not None and self._ring.sequence > 0:
+            self._open(self._awaited)
         if self._writer is not None:
             self._guarded(self._take)
         if time.monotonic() - self._said > _SAY_S:
@@ -103,6 +107,13 @@ class Recorder:
     def _start(self, path: Path, sequence: int) -> None:
         self._written, self._sequence = path, sequence
         self._counts, self._duration_ns = (0, 0, 0, 0, sequence), 0
+        self._state, self._awaited = RecordingState.RECORDING, path
+        # Before its first tick control may still calibrate, and its calibration goes into the file.
+        if self._ring.sequence > 0:
+            self._open(path)
+
+    def _open(self, path: Path) -> None:
+        self._awaited = None
         try:
             self._writer = RecordingWriter(
                 path,
@@ -115,7 +126,7 @@ class Recorder:
         except KeyholeError as error:
             self._fail(error)
             return
-        self._state, self._flushed = RecordingState.RECORDING, time.monotonic()
+        self._flushed = time.monotonic()
 
     def _told(self, name: str) -> str:
         """What control says of itself; empty while it has not spoken."""
@@ -160,6 +171,7 @@ class Recorder:
 
     def _finish(self) -> None:
         """End the recording, if there is one, with all that control has published."""
+        self._awaited = None
         if self._writer is None:
             return
         self._guarded(self._take)

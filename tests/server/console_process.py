@@ -39,11 +39,24 @@ class ConsoleProcess(Console):
 
     Args:
         folder: where its run directory goes.
-        arguments: more arguments of ``keyhole console``.
+        arguments: more arguments of the command.
+        command: it, and what stands before its options.
+
+    Attributes:
+        recordings: its folder of recordings.
     """
 
-    def __init__(self, folder: Path, *arguments: str) -> None:
-        super().__init__(folder / "run", arguments=arguments)
+    def __init__(
+        self, folder: Path, *arguments: str, command: tuple[str, ...] = ("console",)
+    ) -> None:
+        data = folder / "data"
+        self.recordings = data / "keyhole" / "recordings"
+        super().__init__(
+            folder / "run",
+            arguments=arguments,
+            command=command,
+            environment={"XDG_DATA_HOME": str(data)},
+        )
 
     def children(self) -> tuple[int, int]:
         """Process ids of control and web; 0 for one that is down or not yet up."""

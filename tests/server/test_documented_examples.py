@@ -12,6 +12,7 @@ import pytest
 
 from tests.server.api_client import ApiClient
 from tests.server.console_process import ConsoleProcess
+from tests.server.recorded import recorded_run, write
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 BLOCKS = re.findall(
@@ -20,7 +21,8 @@ BLOCKS = re.findall(
     re.MULTILINE | re.DOTALL,
 )
 PROGRAMS = [block for block in BLOCKS if "KEYHOLE_TOKEN" in block]
-PIECES = [block for block in BLOCKS if block not in PROGRAMS]
+READERS = [block for block in BLOCKS if "KEYHOLE_RECORDING" in block]
+PIECES = [block for block in BLOCKS if block not in (*PROGRAMS, *READERS)]
 
 
 def run(program: str, **environment: str) -> str:
@@ -50,6 +52,18 @@ def test_programs_drive_a_console(
     assert after["safety"]["state"] == "DISABLED"
     assert after["time_s"] > before["time_s"]
     assert after["operator"]["name"] is None
+
+
+@pytest.mark.parametrize("cut", [False, True])
+@pytest.mark.parametrize("reader", READERS)
+def test_readers_read_recordings(reader: str, cut: bool, tmp_path: Path) -> None:
+    path, records = tmp_path / "run.mcap", recorded_run()
+    write(path, records)
+    if cut:
+        os.truncate(path, path.stat().st_size // 2)
+    said = run(reader, KEYHOLE_RECORDING=str(path))
+    assert ("cut off" in said) == cut
+    assert cut or f"{len(records)} ticks" in said
 
 
 @pytest.mark.parametrize("piece", PIECES)
