@@ -13,6 +13,7 @@ from server.configuration_file import load
 
 BENCHMARKS = {
     "tick": ("benchmarks.tick", "the controller tick beside a pink step"),
+    "plant": ("benchmarks.plant", "the simulated robot beside its bare engine"),
     "loop": ("benchmarks.loop_lateness", "lateness of the control process beside an empty loop"),
 }
 """Names, modules with ``measure(configuration, seconds)``, titles."""

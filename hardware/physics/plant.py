@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -216,6 +217,15 @@ class PhysicsPlant:
         self._data.qvel[: self._bending] = speeds
         mujoco.mj_forward(self._model, self._data)
         self._sense()
+
+    def engine(self) -> tuple[Any, int]:
+        """Fresh engine data of the same model, to measure it alone, and the steps of a tick."""
+        return mujoco.MjData(self._model), self._steps
+
+    def copy_state(self, data: Any) -> None:
+        """Put the robot's present state into ``data`` of :meth:`engine`."""
+        data.qpos[:], data.qvel[:] = self._data.qpos, self._data.qvel
+        data.qacc_warmstart[:] = self._data.qacc_warmstart
 
     @property
     def _bending(self) -> int:

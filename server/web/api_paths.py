@@ -5,14 +5,16 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING
 
+import numpy as np
 from fastapi import APIRouter
 from starlette.responses import Response
 
 from robot.configuration import Configuration
+from robot.rotations import matrix_from_quaternion
 from server.web.api_models import ExperimentEntry, PathStart
 from server.web.api_robot import ROBOT, STATE
 from server.web.refusals import BoardNeeded
-from server.web.services import Operator, ServicesHere
+from server.web.services import Operator, Services, ServicesHere
 
 if TYPE_CHECKING:
     from scenes.experiments import Experiment
@@ -58,6 +60,18 @@ def _wanted(body: PathStart, configuration: Configuration) -> tuple[Path, str | 
     return found.path, _board_of(found), found.lock_arm
 
 
+def _to_the_board(path: Path, services: Services) -> Path:
+    """The path with a way from where the tip is to where the board was made for."""
+    from scenes.boards.place import place
+    from scenes.lead_in import anchored
+
+    report = services.link.snapshot()["outcome"]["report"][0]
+    turned = np.empty((3, 3))
+    matrix_from_quaternion(report["desired_wxyz"], turned)
+    start = place(services.configuration)
+    return anchored(path, start.tip, start.tip_rotation, report["desired_position"], turned)[0]
+
+
 @router.get("/experiments", summary="The experiments that can be played")
 async def experiments(services: ServicesHere) -> list[ExperimentEntry]:
     """Each is a path of the tip relative to where it starts."""
@@ -68,6 +82,8 @@ async def experiments(services: ServicesHere) -> list[ExperimentEntry]:
 async def start_path(body: PathStart, services: ServicesHere, caller: Operator) -> Response:
     """While it plays, no other leader is followed.
 
+    An experiment on a board first leads the tip to where the board was made for.
+
     409 unless the robot is enabled and free, and the experiment's board stands there.
     """
     path, needed, locks_arm = await asyncio.to_thread(_wanted, body, services.configuration)
@@ -75,6 +91,8 @@ async def start_path(body: PathStart, services: ServicesHere, caller: Operator) 
     present = str(services.link.status()["board"])
     if needed is not None and needed != present:
         raise BoardNeeded(path.name, needed, present)
+    if needed not in (None, "none"):
+        path = await asyncio.to_thread(_to_the_board, path, services)
     services.target.clear()
     await services.requests.start_path(path.samples, path.name, locks_arm)
     return services.state(caller)
