@@ -46,7 +46,7 @@ export class Boards {
     this.changing = true;
     const done = await attempt(call("PUT", `${ROBOT}/board`, { name }, CHANGE_MS).then(() => true));
     this.changing = false;
-    if (done) tell(`In front of the robot now: ${this.title(name)}.`);
+    if (done) tell(name === "none" ? "The board is taken away." : `In front of the robot now: ${this.title(name)}.`);
   }
 
   /** `needed`: the board of the experiment that is chosen. */
@@ -62,6 +62,7 @@ export class Boards {
     setHidden(byId("board-offer"), !other);
     const made = needed === "none" ? "Needs room: no board" : `Made for “${this.title(needed)}”`;
     if (other) setText(byId("board-needed"), made);
+    setText(byId("board-switch"), needed === "none" ? "Take it away" : "Put it there");
     setBlocked(byId("board-switch"), why);
   }
 }

@@ -13,11 +13,15 @@ export class Paths {
     this.boards = boards;
     this.titles = new Map();
     this.boardOf = new Map();
+    this.chosen = false;
     this.blocked = "";
     onPress(byId("play"), () => this.#play({ experiment: byId("experiment").value }), refuse);
     onPress(byId("stop-path"), () => attempt(call("DELETE", `${ROBOT}/path`)), refuse);
     byId("csv").addEventListener("change", () => this.#playFile(byId("csv").files[0]));
-    byId("experiment").addEventListener("change", () => this.#describe());
+    byId("experiment").addEventListener("change", () => {
+      this.chosen = true;
+      this.#describe();
+    });
     this.#startDrop();
     this.load();
   }
@@ -77,7 +81,17 @@ export class Paths {
     });
   }
 
-  show({ path, safety, board }, blocked) {
+  /** At first, an experiment that fits the board that stands there. */
+  #choose(board) {
+    if (this.chosen || this.titles.size === 0) return;
+    this.chosen = true;
+    const fitting = [...this.boardOf.keys()].find((name) => this.boards.why(this.boardOf.get(name), board) === "");
+    if (fitting !== undefined) byId("experiment").value = fitting;
+    this.#describe();
+  }
+
+  show({ path, safety, board, control }, blocked) {
+    if (control === "running") this.#choose(board);
     const asleep = safety.state === "ENABLED" ? "" : "Enable the robot first.";
     const running = path ? "A path is playing. Stop it first." : "";
     this.blocked = blocked || asleep || running;
