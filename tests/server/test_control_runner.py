@@ -12,8 +12,9 @@ import pytest
 from hardware.kinematic_plant import KinematicPlant
 from robot.configuration import Configuration
 from robot.instrument_robot import InstrumentRobot
-from robot.records import Safety
+from robot.records import Request, Safety
 from robot.safety import Event
+from scenes.boards.board import BOARD_NAMES, Board
 from server.configuration_file import load
 from server.control.lifeline import Lifeline
 from server.control.loop import ControlLoop
@@ -103,3 +104,31 @@ def test_missed_deadlines_are_counted_and_the_grid_stays(
     assert after["lateness_ns"][0] > 4e9 / RATE_HZ
     assert (np.diff(header["time_ns"]) == 1e9 / robot.configuration.control.rate_hz).all()
     assert plant.held == 1
+
+
+class BoardedPlant(BreakingPlant):
+    """A plant that takes its time to change boards."""
+
+    boards: list[str]
+
+    def change_board(self, board: Board) -> None:
+        time.sleep(50.5 / RATE_HZ)
+        self.boards.append(board.name)
+
+
+def test_boards_are_changed_only_while_disabled_and_cost_no_overruns(
+    robot: InstrumentRobot, web: WebLink, tmp_path: Path
+) -> None:
+    plant = BoardedPlant(robot.configuration, robot.initial_state()["x"][0])
+    plant.boards = []
+    runner = make_runner(robot, plant, tmp_path)
+    web.change_board(BOARD_NAMES.index("ring-board"))
+    web.request(Request.ENABLE)
+    web.change_board(BOARD_NAMES.index("none"))
+    threading.Timer(0.8, runner.stop).start()
+    runner.run()
+    assert plant.boards == [runner.board] == ["ring-board"]
+    records = web.ring().read_since(0)[0]
+    changed = int(np.argmax(records["header"]["request_sequence"] >= 1))
+    counted = records["header"]["overruns"]
+    assert counted[changed + 1] - counted[changed] < 25
