@@ -87,6 +87,7 @@ class PhysicsPlant:
         self._stiffness, self._springs = model.tendon_stiffness, model.tendon_lengthspring[:, 1]
         self._length = data.ten_length
         mujoco.mj_forward(model, data)
+        self._standing = data.qpos.copy()
         self._watch = ContactWatch(self._physics, board)
 
     def _actuation(self) -> np.ndarray:
@@ -151,6 +152,7 @@ class PhysicsPlant:
 
     def _sense(self) -> None:
         mujoco.mj_kinematics(self._model, self._data)
+        self._standing[:] = self._data.qpos
         self._q[:] = self._data.qpos[self._arm]
         self._servo[:] = self._drives["servo"][0]
         self._tension[:] = self._drives["tension"][0]
@@ -186,10 +188,12 @@ class PhysicsPlant:
             whole = abs(passed - expected) < 0.5 * self._model.opt.timestep
             self._failed = not (whole and bool(np.isfinite(self._data.qpos).all()))
         self._time_ns += self.spec.tick_ns
-        if self._failed:
-            self._measurement = self._measurement._replace(failed=True)
-        else:
+        if not self._failed:
             self._sense()
+        elif not self._measurement.failed:
+            self._measurement = self._measurement._replace(failed=True)
+            self._data.qpos[:] = self._standing
+            mujoco.mj_kinematics(self._model, self._data)
         return self.spec.tick_ns
 
     def hold(self) -> None:
@@ -212,7 +216,10 @@ class PhysicsPlant:
         """Put another board in front of the robot, which stays as it stands. Takes some 10 ms."""
         positions = self._data.qpos[: self._bending].copy()
         speeds = self._data.qvel[: self._bending].copy()
+        time = self._data.time
         self._assemble(board)
+        # A blow-up is told by the clock jumping back to 0: it must not be there.
+        self._data.time = time
         self._data.qpos[: self._bending] = positions
         self._data.qvel[: self._bending] = speeds
         mujoco.mj_forward(self._model, self._data)
