@@ -20,6 +20,7 @@ from robot.rotations import (
     matrix_from_quaternion,
     multiply,
     orthonormalize,
+    quaternion_from_matrix,
 )
 
 OLDEST_S = 0.5
@@ -106,6 +107,14 @@ def correct(s: RecordFields, tracker: RecordFields, use: bool, dt: float, p: np.
     for i in range(3):
         s.correction_position[i] *= left
         s.correction_rotation[i] *= left
+
+
+@compiled
+def expected_pose(outcome: np.ndarray, position: np.ndarray, wxyz: np.ndarray) -> None:
+    """Where the tip is, as far as is known, of a (1,) outcome: (3,) in m and (4,) quaternion."""
+    rotation = np.empty((3, 3))
+    expected_tip(outcome[0].state, position, rotation)
+    quaternion_from_matrix(rotation, wxyz)
 
 
 @compiled

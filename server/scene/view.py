@@ -23,6 +23,7 @@ from robot.errors import KeyholeError
 from robot.records import Safety
 from robot.rotations import angle_between, matrix_from_quaternion
 from robot.segment import tip_rotation
+from robot.sensing.tip_correction import expected_pose
 from robot.urdf import FLANGE
 from scenes.boards.board import BOARD_NAMES, board
 from server.scene.board import SceneBoard
@@ -190,6 +191,6 @@ class SceneView:
         turned = angle_between(desired, tip)
         self._ghost.update(now, report["desired_position"], report["desired_wxyz"], (away, turned))
         enabled = record["outcome"]["state"]["safety"] == Safety.ENABLED
-        self.gizmo.update(
-            now, report["commanded_position"], report["commanded_wxyz"], ready=bool(enabled)
-        )
+        position, wxyz = np.empty(3), np.empty(4)
+        expected_pose(np.array([record["outcome"]]), position, wxyz)
+        self.gizmo.update(now, position, wxyz, ready=bool(enabled))
