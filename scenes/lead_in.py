@@ -20,7 +20,7 @@ SPEED_M_S = 0.010
 TURN_RAD_S = math.radians(10.0)
 NEAR_M = 0.005
 """Up to this far off the way is straight."""
-RETREAT_M = 0.009
+RETREAT_M = 0.006
 """That the tip goes along its own axis, at both ends of a longer way."""
 ARCH_M = 0.015
 """Height of the arch over the straight line, along the base's z."""
@@ -104,7 +104,7 @@ def _way(legs: list[_Leg], vector: np.ndarray) -> np.ndarray:
         rows = np.zeros((count, 8))
         rows[:, 0] = passed + share * leg.duration_s
         rows[:, 1:4] = leg.begin + smooth[:, None] * (leg.end - leg.begin)
-        rows[:, 3] += leg.arch_m * np.sin(math.pi * smooth) ** 2
+        rows[:, 3] += leg.arch_m * np.sin(math.pi * smooth)
         for row, part in zip(rows, smooth, strict=True):
             exponential((leg.turn_begin + part * (leg.turn_end - leg.turn_begin)) * vector, turn)
             quaternion_from_matrix(turn, row[4:8])

@@ -87,11 +87,10 @@ def test_from_the_end_of_an_experiment_the_tip_comes_back_past_ball_and_board(
         whole, way_s = anchored(path, here.tip, here.tip_rotation, tip, rotation)
         position, turns = at(whole, np.linspace(0.0, way_s, 300))
         axes = (turns.as_matrix() @ rotation)[:, :, 2]
-        # The last 5 mm of the instrument, as spheres; the rest of it leads upward.
-        for back in (here.tip_radius, 0.005):
-            centres = tip + position - back * axes
-            for solid in one.solids:
-                assert distances(solid, centres).min() > here.tip_radius + 3e-4
-            if one.ball is not None:
-                away = np.linalg.norm(centres - one.ball.position, axis=1)
-                assert away.min() > one.ball.radius + here.tip_radius + 3e-4
+        # The rounded end; the rest of the instrument leads upward from it.
+        ends = tip + position - here.tip_radius * axes
+        for solid in one.solids:
+            assert distances(solid, ends).min() > here.tip_radius + 3e-4
+        if one.ball is not None:
+            away = np.linalg.norm(ends - one.ball.position, axis=1)
+            assert away.min() > one.ball.radius + here.tip_radius + 3e-4
