@@ -171,8 +171,12 @@ class Recorder:
 
     def _finish(self) -> None:
         """End the recording, if there is one, with all that control has published."""
+        if self._awaited is not None and self._ring.sequence > 0:
+            self._open(self._awaited)
         self._awaited = None
         if self._writer is None:
+            if self._state == RecordingState.RECORDING:
+                self._state = RecordingState.IDLE
             return
         self._guarded(self._take)
         if self._writer is not None:

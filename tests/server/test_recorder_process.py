@@ -33,6 +33,8 @@ class Publisher:
     """In place of control: publishes a run over and over into the ring, at the rate of the loop."""
 
     def __init__(self, folder: Path) -> None:
+        # Not in the thread: its first call may have to compile the controller.
+        recorded_run()
         self._ring = MappedRing(folder / RECORD_RING_FILE, RECORD, writable=True)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run)
@@ -74,11 +76,13 @@ class Place:
         self.link = RecordingLink(folder)
         self._processes: list[subprocess.Popen[bytes]] = []
 
-    def recorder(self) -> subprocess.Popen[bytes]:
-        """Start one, and wait until it says that it is there."""
+    def recorder(self, *descriptors: int) -> subprocess.Popen[bytes]:
+        """Start one, with the reading end of a lifeline if any; wait until it says it is there."""
         arguments = ["--run-directory", str(self.folder)]
+        for descriptor in descriptors:
+            arguments += ["--lifeline-fd", str(descriptor)]
         command = module_command("server.recording.recorder_process", arguments)
-        process = subprocess.Popen(command, env=module_environment())
+        process = subprocess.Popen(command, env=module_environment(), pass_fds=descriptors)
         self._processes.append(process)
         eventually(lambda: self.link.status().pid == process.pid, "the recorder runs", PATIENT_S)
         return process
@@ -201,6 +205,20 @@ def test_asked_before_the_first_tick_it_waits_and_has_every_tick(
     assert contents(path)[1] == list(range(40))
     with Recording(path) as recording:
         assert recording.calibration() == other
+
+
+def test_without_a_supervisor_it_completes_the_file_and_ends(place: Place, tmp_path: Path) -> None:
+    path = tmp_path / "orphan.mcap"
+    reading, writing = os.pipe()
+    recorder = place.recorder(reading)
+    os.close(reading)
+    place.start(path)
+    Publisher(place.folder).push(30)
+    os.close(writing)
+    assert recorder.wait(PATIENT_S) == 0
+    assert contents(path)[1] == list(range(30))
+    with Recording(path) as recording:
+        assert not recording.cut
 
 
 def test_where_nothing_can_be_written_it_says_so_and_stays(place: Place, tmp_path: Path) -> None:
