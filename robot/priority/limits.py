@@ -123,7 +123,8 @@ def active_limits(
     ratio = p.pulley_radius / p.pitch_radius
     for i in range(10):
         touched = x_dot[i] >= upper[i] - _TOUCH or x_dot[i] <= lower[i] + _TOUCH
-        if not touched:
+        locked = lower[i] == 0.0 and upper[i] == 0.0
+        if locked or not touched:
             continue
         bound = upper[i] if x_dot[i] >= upper[i] - _TOUCH else -lower[i]
         if i < 7:
