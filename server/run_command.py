@@ -15,6 +15,7 @@ from robot.priority.levels import CASE_NAMES
 from scenes.boards.board import BOARD_NAMES
 from scenes.experiments import experiment, names
 from scenes.path_file import parse_csv
+from server import calibration_file
 from server.configuration_file import load
 from server.control.loop import COORDINATE_NAMES, SOLVER_NAMES
 from server.figure_table import printed
@@ -133,11 +134,7 @@ def execute(arguments: argparse.Namespace) -> int:
 
 def given_calibration(file: str | None) -> Calibration | None:
     """The calibration in ``file``; None without a file."""
-    if file is None:
-        return None
-    from server.calibration_file import load_calibration
-
-    return load_calibration(file)
+    return None if file is None else calibration_file.load(Path(file))
 
 
 def _play(run: HeadlessRun, title: str, stopped: StopSignals, record: str | None) -> RunResult:

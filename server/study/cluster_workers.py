@@ -67,7 +67,7 @@ def cluster_outcomes(
 
 def _finished(distributed: Any, pending: dict[Any, Work]) -> list[Any]:
     try:
-        done = distributed.wait(pending, timeout=_POLL_S, return_when="FIRST_COMPLETED").done
+        done = distributed.wait(list(pending), timeout=_POLL_S, return_when="FIRST_COMPLETED").done
     except (distributed.TimeoutError, TimeoutError):
         return []
     return list(done)
