@@ -17,6 +17,7 @@ from robot.configuration import Configuration
 from robot.forward import ForwardKinematics
 from robot.instrument_robot import InstrumentRobot
 from robot.records import RECORD, LeaderKind, Safety
+from robot.rotations import matrix_from_quaternion
 from robot.urdf import urdf_text
 from server.memory.mapped import MappedReadError
 
@@ -56,6 +57,9 @@ class Recorder:
         for word in ("desired", "commanded"):
             report[f"{word}_position"] = truth["position"]
             report[f"{word}_wxyz"] = truth["wxyz"]
+        state = record["outcome"]["state"][0]
+        state["tip_position"] = truth["position"][0]
+        matrix_from_quaternion(truth["wxyz"][0], state["tip_rotation"])
         self.record = record
 
     def snapshot(self) -> NDArray[Any]:
