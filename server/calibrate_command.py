@@ -12,6 +12,7 @@ from server.calibration import calibrate
 from server.calibration_file import default_path, save
 from server.configuration_file import load
 from server.progress_bar import ProgressBar
+from server.run_command import seed
 from server.run_options import PLANTS, PRESETS
 
 
@@ -22,7 +23,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--plant", choices=PLANTS, help="the robot")
     parser.add_argument("--preset", choices=PRESETS, help="how good the simulated robot is")
-    parser.add_argument("--seed", type=int, help="which robot of the preset")
+    parser.add_argument("--seed", type=seed, metavar="N", help="which robot of the preset")
     parser.add_argument("--config", metavar="FILE", help="configuration (TOML)")
     parser.add_argument(
         "--out",
