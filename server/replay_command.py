@@ -35,12 +35,15 @@ def execute(arguments: argparse.Namespace) -> int:
     """
     if arguments.verify:
         return _verify(arguments.file)
+    from server.configuration_file import load
     from server.console_command import serve
     from server.recording.reader import Recording
 
     path = arguments.file.absolute()
     with Recording(path) as recording:
-        configuration = recording.configuration()
+        recorded = recording.configuration()
+    # Where the page is served is no matter of the recording, which may come from anybody.
+    configuration = recorded.model_copy(update={"server": load().server})
     return serve(arguments, configuration, replay=path)
 
 

@@ -12,6 +12,7 @@ from server.recording.reader import Recording
 from server.recording.verify import verify
 from tests.browser_tests.conftest import VIEWPORT, Complaints
 from tests.browser_tests.console_page import SLOW_S, ConsolePage
+from tests.browser_tests.test_page import layout_faults
 from tests.server.console_process import ConsoleProcess, eventually
 from tests.server.recorded import recorded_run, write
 
@@ -60,6 +61,8 @@ def test_a_replay_follows_the_slider_and_moves_nothing(replay: ConsolePage) -> N
     page, console = replay.page, replay.console
     expect(page.locator("#safety-state")).to_have_text("REPLAY", timeout=SLOW_S * 1e3)
     expect(page.locator("#watcher-note")).to_have_text("This is a replay: nothing moves.")
+    page.set_viewport_size({"width": 1280, "height": 800})
+    assert not layout_faults(page)
     for name in ("Enable", "Pause", "Play path", "Take control", "Start recording"):
         expect(page.get_by_role("button", name=name)).to_have_attribute("aria-disabled", "true")
     slider = page.get_by_role("slider", name="Time in the recording")

@@ -215,7 +215,7 @@ def test_the_stream_follows_back_and_forth(client: ApiClient) -> None:
 
 
 def test_it_plays_by_itself(client: ApiClient) -> None:
-    client.done("PUT", "/replay", {"time_s": 0.0, "playing": True, "speed": 0.5})
+    client.done("PUT", "/replay", {"time_s": 0.0, "playing": True, "speed": 1.0})
     client.until(lambda state: state["replay"]["time_s"] > 0.3, "it has gone on", SLOW_S)
     client.until(lambda state: not state["replay"]["playing"], "it ends", SLOW_S)
     assert client.state()["tick"] == len(recorded_run())
