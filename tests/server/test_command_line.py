@@ -101,8 +101,8 @@ def test_a_refusal_is_one_line_and_status_2(
 def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--help"]) == 0
     told = capsys.readouterr().out
-    for name in COMMANDS:
-        assert f"  {name} " in told
+    listed = {line.split()[0] for line in told.splitlines() if line.startswith("    ")}
+    assert set(COMMANDS) <= listed
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
