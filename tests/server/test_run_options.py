@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,7 +59,7 @@ def test_an_experiment_brings_its_board_and_locks_its_arm(name: str) -> None:
 def test_unknown_names_are_refused_with_those_that_exist(
     fields: dict[str, str], words: str
 ) -> None:
-    wanted = {"case": "1"} | fields
+    wanted: dict[str, Any] = {"case": "1"} | fields
     options = RunOptions("x", PATH, solver="hqp", coordinates="uv", **wanted)
     with pytest.raises(UnknownName, match=f"unknown {words}; choose one of"):
         HeadlessRun(headless.configuration(), options)

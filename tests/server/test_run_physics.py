@@ -67,7 +67,7 @@ def test_compensation_takes_back_what_the_tendons_lose() -> None:
         played("arc", "0", False, mode)["bend"]["theta_deg"]["max"]
         for mode in ("off", "gain", "full")
     ]
-    assert errors[2] < errors[1] < errors[0]
+    assert errors[2] < 0.6 * min(errors[:2])
 
 
 def test_equal_runs_are_equal_bit_for_bit_and_other_seeds_are_others() -> None:
