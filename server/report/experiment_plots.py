@@ -14,6 +14,8 @@ from server.run_figures import desired_bend
 
 _AXES = "xyz"
 _SEEN_MM = 3.0
+_LEAST_RESIDUAL = 0.1
+_POINTS = 1000
 _DEGREES = 180.0 / math.pi
 
 
@@ -46,7 +48,8 @@ def _draw_path(axes: Axes, runs: Sequence[dict[str, np.ndarray]], across: int, u
     """The desired path of the first run and the true ones of all, in the plane of two base axes."""
     origin = runs[0]["trace"][0, 18:21]
     for number, run in enumerate(runs):
-        tip = 1e3 * (run["trace"][:, 11:14] - origin)
+        every = max(1, len(run["trace"]) // _POINTS)
+        tip = 1e3 * (run["trace"][::every, 11:14] - origin)
         label = "true" if number == 0 else None
         axes.plot(tip[:, across], tip[:, up], color=COLOURS["true"], lw=1.0, label=label)
     asked = 1e3 * (runs[0]["trace"][:, 18:21] - origin)
@@ -145,6 +148,8 @@ def residual_plot(results: Results, experiments: Sequence[str], key: str) -> str
         for row, (words, _, _) in enumerate(rows):
             axes = plot.axes[row * len(experiments) + column]
             finish(axes, words if column == 0 else "", "time, s" if row == 1 else "")
+            # What is numerical noise shall not look like a residual.
+            axes.set_ylim(0.0, max(axes.get_ylim()[1], _LEAST_RESIDUAL))
         title(plot.axes[column], name)
     plot.legend()
     return plot.svg(key, "Twist residuals of the three cases")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -29,6 +30,8 @@ STYLES = {"0": "-", "1": (0, (6, 2)), "2": (0, (1.5, 1.5))}
 """Line of each case: colour alone says nothing in print or to the colour-blind."""
 
 _PIXELS_A_POINT = 4.0 / 3.0
+_POINTS = 500
+"""Of a line over time: more cannot be seen."""
 
 _SETTINGS: Any = {
     "svg.fonttype": "none",
@@ -102,6 +105,7 @@ def _inlined(text: str, key: str, title: str) -> str:
     head, rest = text.split(">", 1)
     box = re.search(r'viewBox="[^"]+"', head)
     assert box is not None
+    rest = re.sub(r"(\d\.\d\d)\d+", r"\1", rest)
     rest = re.sub(r'id="([^"]+)"', rf'id="{key}-\1"', rest)
     rest = re.sub(r'xlink:href="#([^"]+)"', rf'href="#{key}-\1"', rest)
     rest = re.sub(r"url\(#([^)]+)\)", rf"url(#{key}-\1)", rest)
@@ -133,6 +137,8 @@ def title(axes: Axes, words: str) -> None:
 def band(axes: Axes, time_s: np.ndarray, runs: Sequence[np.ndarray], case: str, name: str) -> None:
     """The median over the runs as a line, smallest to largest as a band.
 
+    Where there are more samples than can be seen, the largest of each few stands for them.
+
     Args:
         axes: where.
         time_s: (n,) s.
@@ -141,13 +147,17 @@ def band(axes: Axes, time_s: np.ndarray, runs: Sequence[np.ndarray], case: str, 
         name: in the legend.
     """
     shortest = min(len(run) for run in runs)
-    values = np.array([run[:shortest] for run in runs])
+    block = max(1, math.ceil(shortest / _POINTS))
+    count = shortest // block
+    # A block of samples becomes one point; the band keeps the largest and smallest of each.
+    values = np.array([run[: count * block].reshape(count, block) for run in runs])
     colour = COLOURS[f"case-{case}"]
-    time_s = time_s[:shortest]
+    time_s = time_s[: count * block : block]
     if len(runs) > 1:
-        low, high = values.min(axis=0), values.max(axis=0)
+        low, high = values.min(axis=(0, 2)), values.max(axis=(0, 2))
         axes.fill_between(time_s, low, high, color=colour, alpha=0.18, linewidth=0.0)
-    axes.plot(time_s, np.median(values, axis=0), color=colour, linestyle=STYLES[case], label=name)
+    middle = np.median(values.max(axis=2), axis=0)
+    axes.plot(time_s, middle, color=colour, linestyle=STYLES[case], label=name)
 
 
 def limit(axes: Axes, value: float, words: str) -> None:
