@@ -32,8 +32,9 @@ from server.memory.recording_link import (
     read_status,
 )
 from server.memory.run_directory import RunDirectory
-from server.recording.errors import RecordingNotWritten
+from server.recording.errors import RecordingError, RecordingNotWritten
 from server.recording.folder import following
+from server.recording.reader import Recording
 from server.recording.writer import CHUNK_S, RecordingWriter
 
 _PERIOD_S = 0.05
@@ -77,9 +78,23 @@ class Recorder:
             self._state = RecordingState.FAILED
             return
         path = following(before.path)
-        self._start(path, before.next_sequence)
+        self._start(path, self._after(before))
         if self._state == RecordingState.RECORDING and path != before.path:
             self._message = f"the recorder was started again; the part before is {before.path.name}"
+
+    def _after(self, before: RecordingStatus) -> int:
+        """Number of the first record that is not in the file of the recorder before.
+
+        It may have written a chunk more than it has told of.
+        """
+        assert before.path is not None
+        try:
+            with Recording(before.path) as recording:
+                last = int(recording.batch(recording.chunks[-1]).sequence[-1])
+        except RecordingError:
+            return before.next_sequence
+        ahead = (last + 1 - before.next_sequence) & 0xFFFFFFFF
+        return before.next_sequence + (ahead if ahead <= self._ring.capacity else 0)
 
     def step(self) -> None:
         """Follow what is asked, and write what has come; called some twenty times a second."""
