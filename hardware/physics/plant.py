@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import sys
 from typing import Any
 
 import mujoco
@@ -25,6 +27,16 @@ _EXERCISE_SHRINKS = 0.75
 _EXERCISES = 16
 _EXERCISE_S = 0.12
 _SETTLE_S = 0.4
+
+
+def _warn(text: str) -> None:
+    """Say what the engine warns of; by itself it would write a file where the process stands."""
+    # An error that left this function would end the process.
+    with contextlib.suppress(Exception):
+        print(f"simulation: {text}", file=sys.stderr)
+
+
+mujoco.set_mju_user_warning(_warn)
 
 
 class PhysicsPlant:

@@ -297,6 +297,17 @@ def test_a_simulation_that_blows_up_is_noticed_and_stands_still(
         assert here.truth(plant).tobytes() == standing.tobytes()
 
 
+def test_a_blow_up_is_told_and_leaves_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    plant = here.physics("paper")
+    spoil(plant, "qvel nan")
+    plant.advance()
+    assert "simulation: Nan, Inf or huge value" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("request_first", [Request.ENABLE, Request.NONE])
 def test_a_blow_up_is_a_fault_of_the_loop(
     request_first: Request, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
