@@ -139,7 +139,7 @@ def _targets(found: Sequence[Verdict], conditions: Conditions) -> str:
             Cell(paper, "number"),
             Cell(bound.allowed(), "number"),
             Cell(ours, "number"),
-            Cell(str(verdict.seed or "–"), "number"),
+            Cell("–" if verdict.seed is None else str(verdict.seed), "number"),
             _verdict(None if verdict.worst is None else verdict.met, "met", "not met"),
             verdict.remark,
         ]

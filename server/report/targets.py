@@ -179,9 +179,8 @@ def _verdict(target: Target, bound: Bound, documents: list[dict[str, Any]], whol
         return Verdict(target, bound, None, None, False, "not run")
     worst, seed = min(found) if bound.smallest else max(found)
     stops = sorted({document["ended"] for document in documents} - {"completed"})
+    values = [value for value, _ in found]
     met = not stops and whole
-    if bound.high is not None:
-        met = met and worst <= bound.high
-    if bound.low is not None:
-        met = met and worst >= bound.low
+    met = met and (bound.high is None or max(values) <= bound.high)
+    met = met and (bound.low is None or min(values) >= bound.low)
     return Verdict(target, bound, worst, seed, met, f"stopped: {'; '.join(stops)}" if stops else "")

@@ -98,6 +98,14 @@ def test_one_bad_seed_is_the_worst_and_enough(tmp_path: Path, place: int) -> Non
         assert verdict.seed in seeds
 
 
+def test_what_shall_be_like_the_paper_s_is_so_on_every_seed(tmp_path: Path) -> None:
+    found = study()
+    put(found, TARGETS[0].setting, 2, "bend.theta_deg.max", 2.0)
+    first, second = judged(found, tmp_path)[:2]
+    assert not first.met
+    assert second.met
+
+
 def test_a_run_that_was_stopped_meets_nothing_and_says_why(tmp_path: Path) -> None:
     found = study()
     put(found, TARGETS[0].setting, 2, "ended", "emergency stop")
