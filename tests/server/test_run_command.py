@@ -17,9 +17,10 @@ from scipy.spatial.transform import Rotation
 
 from hardware.kinematic_plant import KinematicPlant
 from hardware.plant import Measurement
-from scenes.experiments import names
+from scenes.experiments import experiment, names
 from server import headless_run
 from server.command_line import main
+from server.configuration_file import load
 from server.headless_run import SETTLING_S, TRACE_COLUMNS
 from server.supervision.child_process import module_command, module_environment
 from tests import own_kinematics
@@ -156,6 +157,31 @@ def test_the_list_has_every_experiment(capsys: pytest.CaptureFixture[str]) -> No
     assert [line.split()[0] for line in listed] == list(names())
 
 
+def test_all_runs_every_experiment_for_every_case_it_lists(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "all.json"
+    command = ["run", "all", "--plant", "kinematic", "--seconds", "0.1", "--json", str(file)]
+    assert main(command) == 0
+    found = [(one["experiment"], one["case"]) for one in json.loads(file.read_text())]
+    assert found == [(name, case) for name in names() for case in experiment(name, load()).cases]
+    assert len(capsys.readouterr().out.splitlines()) == 1 + len(found)
+    assert main([*command, "--case", "pointing"]) == 0
+    cases = [one["case"] for one in json.loads(file.read_text())]
+    assert cases == ["pointing"] * len(names())
+
+
+def test_a_run_can_be_recorded_and_computed_anew(
+    tmp_path: Path, short: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "deep" / "run.mcap"
+    command = ["run", "--plant", "kinematic", "--path", short, "--record", str(file)]
+    assert main(command) == 0
+    assert main(["replay", str(file), "--verify"]) == 0
+    capsys.readouterr()
+    assert str(file) in refused(command, capsys)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_run_that_is_stopped_still_writes_its_json(
     tmp_path: Path, number: signal.Signals
@@ -275,6 +301,8 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["run", "circle", "--seed", "9999999999"], "a seed is a whole number from 0"),
         (["run", "circle", "--seconds", "nan"], "must be a number above 0"),
         (["run", "all", "--trace", "x.csv"], "--trace is of one run"),
+        (["run", "all", "--record", "x.mcap"], "--record is of one run"),
+        (["run", "circle", "--calibration", "no/such.toml"], "no/such.toml"),
         (["run", "circle", "twice"], "unrecognized arguments"),
         (["run", "--path", "no/such/file.csv"], "no/such/file.csv: No such file"),
         (["run", "--path", "/"], "/: Is a directory"),
