@@ -22,6 +22,7 @@ from robot.rotations import quaternion_from_matrix
 from robot.tendons import servo_angles
 from scenes.boards.board import Board
 
+NO_BOARD = Board("none", "No board")
 _EXERCISE_RAD = 0.2
 _EXERCISE_SHRINKS = 0.75
 _EXERCISES = 16
@@ -76,11 +77,12 @@ class PhysicsPlant:
         self._trocar_offset = np.zeros(3)
         self._servo, self._tension = np.zeros(SERVOS), np.zeros(SERVOS)
         self._q = np.zeros(ARM_JOINTS)
-        self._assemble(board)
+        self._assemble(NO_BOARD)
         self._constants = self._actuation()
         self._wake(x)
         self._tracker = TipTracker(configuration.tracker, noise)
-        self._sense()
+        # Only now, so that nothing stands in the way of a segment that comes from straight.
+        self.change_board(board)
         self.register_trocar(np.array(configuration.trocar.position_m))
 
     def _assemble(self, board: Board) -> None:
