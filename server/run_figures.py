@@ -71,7 +71,11 @@ def result_document(
             "max_abs_error": float(lambdas.max()) if steps else None,
         },
         "bend_deg": {"max": float(bend.max()) if steps else None},
-        "limits": {"violations": result.violations, "held_back": result.limits},
+        "limits": {
+            "violations": result.violations,
+            "true_violations": result.true_violations,
+            "held_back": result.limits,
+        },
         **_touched(configuration, result.detail),
         "tick_us": {
             "p50": float(np.percentile(ticks, 50)) if steps else None,
