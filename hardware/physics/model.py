@@ -233,8 +233,6 @@ def _options(spec: Any) -> None:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     spec.option.solver = mujoco.mjtSolver.mjSOL_CG
     spec.compiler.degree = False
-    # Where nothing is near, no time is spent on finding that out.
-    spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
 
 
 def build(configuration: Configuration, preset: Preset, drawn: Drawn, board: Board) -> PhysicsModel:

@@ -81,16 +81,14 @@ def _schedule() -> str:
     try:
         os.sched_setscheduler(0, policy, os.sched_param(PRIORITY))
     except PermissionError:
-        pass
+        limit = resource.getrlimit(resource.RLIMIT_RTPRIO)[1]
+        return (
+            f"SCHED_FIFO is not permitted (rtprio limit {limit}, {PRIORITY} needed); "
+            f"give the user 'rtprio {PRIORITY}' in /etc/security/limits.d and log in again"
+        )
     except OSError as error:
         return f"SCHED_FIFO: {error.strerror}"
-    else:
-        return ""
-    limit = resource.getrlimit(resource.RLIMIT_RTPRIO)[1]
-    return (
-        f"SCHED_FIFO is not permitted (rtprio limit {limit}, {PRIORITY} needed); "
-        f"give the user 'rtprio {PRIORITY}' in /etc/security/limits.d and log in again"
-    )
+    return ""
 
 
 def lock_memory() -> str:
