@@ -14,14 +14,14 @@ from robot.errors import KeyholeError
 from server.version import version
 
 COMMANDS = {
-    "console": "server.console_command",
-    "run": "server.run_command",
-    "calibrate": "server.calibrate_command",
-    "replay": "server.replay_command",
-    "study": "server.study_command",
-    "report": "server.report_command",
+    "console": "server.commands.console",
+    "run": "server.commands.run",
+    "calibrate": "server.commands.calibrate",
+    "replay": "server.commands.replay",
+    "study": "server.commands.study",
+    "report": "server.commands.report",
     "bench": "benchmarks.command",
-    "states": "server.states_command",
+    "states": "server.commands.states",
 }
 """Subcommands and their modules: ``add_parser(subparsers)`` and ``execute(arguments) -> int``."""
 

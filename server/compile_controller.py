@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from scenes.experiments import experiment
 from server.configuration_file import load
-from server.headless_run import HeadlessRun
-from server.run_options import options_for
+from server.run.headless import HeadlessRun
+from server.run.options import options_for
 
 
 def main() -> None:

@@ -125,8 +125,8 @@ def _run(directory: RunDirectory, configuration: Configuration, lifeline: Lifeli
 
 def _calibration(configuration: Configuration, status: Status) -> Calibration:
     """The calibration that is kept for this robot; a simulated one is calibrated where none is."""
-    from server.calibration import calibration_for
-    from server.calibration_file import CalibrationFileError, default_path, load_if_there, save
+    from server.calibration.file import CalibrationFileError, default_path, load_if_there, save
+    from server.calibration.sweep import calibration_for
 
     path = default_path(configuration)
     kept = load_if_there(path)

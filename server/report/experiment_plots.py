@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from server.report.plots import COLOURS, Plot, band, finish, limit, title
 from server.report.results import Results, Setting
-from server.run_figures import desired_bend
+from server.run.figures import desired_bend
 
 _AXES = "xyz"
 _SEEN_MM = 3.0

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from robot.configuration import Configuration
-from server.figure_table import figure
 from server.report import markup
 from server.report.experiment_plots import bend_limit_plot, bend_plot, errors_plot, path_plot
 from server.report.results import SETTINGS, Results, Setting
+from server.run.figure_table import figure
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ import numpy as np
 from robot.configuration import Configuration
 from robot.dexterity import Dexterity
 from robot.priority.levels import case_named
-from server.figure_table import figure
 from server.report.results import Results, Setting
+from server.run.figure_table import figure
 
 _EVERY_ROWS = 10
 """Of the traces' rows, 20 ms apart: dexterity changes slowly."""

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from server.figure_table import figure
 from server.report.results import Results, Setting
+from server.run.figure_table import figure
 
 BALL_AT_END = 0.98
 _RAD = math.pi / 180.0

@@ -8,7 +8,7 @@ from pathlib import Path
 
 _ROOT = Path(__file__).resolve().parents[2]
 _DECIDING = ("robot", "scenes", "hardware", "server/control")
-_DECIDING_FILES = ("server/headless_run.py", "server/run_figures.py", "server/study/work.py")
+_DECIDING_FILES = ("server/run/headless.py", "server/run/figures.py", "server/study/work.py")
 _KINDS = (".py", ".toml", ".csv")
 
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from robot.configuration import Configuration
-from server.figure_table import csv_text
-from server.progress_bar import ProgressBar, clock
+from server.commands.progress_bar import ProgressBar, clock
+from server.run.figure_table import csv_text
 from server.study.cluster_workers import cluster_outcomes
 from server.study.folder import StudyFolder
 from server.study.local_workers import local_outcomes

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from robot.configuration import Configuration
 from scenes.experiments import experiment
-from server.run_options import RunOptions, cut, options_for
+from server.run.options import RunOptions, cut, options_for
 from server.study.program_mark import program_mark
 
 _MARK_LENGTH = 12

@@ -15,8 +15,8 @@ import numpy as np
 from robot.calibration import Calibration
 from robot.configuration import Configuration
 from robot.errors import KeyholeError
-from server.headless_run import HeadlessRun, RunResult
-from server.run_figures import result_document
+from server.run.figures import result_document
+from server.run.headless import HeadlessRun, RunResult
 from server.study.program_mark import program_mark
 from server.study.task import Task
 from server.version import version
@@ -95,7 +95,7 @@ def _run(work: Work, interrupted: Callable[[], bool]) -> Outcome:
 def packed_trace(result: RunResult, dt_s: float) -> bytes:
     """A ``.npz`` of a row every 20 ms, single precision.
 
-    It holds ``trace``, ``detail`` and ``errors`` of a :class:`server.headless_run.RunResult`. Equal
+    It holds ``trace``, ``detail`` and ``errors`` of a :class:`server.run.headless.RunResult`. Equal
     results give equal bytes.
 
     Args:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from robot.sensing.tendon_fit import FEWEST_SAMPLES, SweepTooPoor, bend_of, fit
-from server.calibration import sweep_bends
+from server.calibration.sweep import sweep_bends
 from tests import own_kinematics
 
 DT = 0.008

@@ -15,9 +15,9 @@ from scenes.experiments import experiment
 from scenes.path import Path
 from scenes.static_optimum import StaticOptimum
 from server.configuration_file import load
-from server.headless_run import TRACE_COLUMNS, HeadlessRun, RunResult
-from server.run_figures import result_document
-from server.run_options import RunOptions
+from server.run.figures import result_document
+from server.run.headless import TRACE_COLUMNS, HeadlessRun, RunResult
+from server.run.options import RunOptions
 from tests import own_kinematics
 
 

@@ -12,8 +12,7 @@ import pytest
 from robot.calibration import Calibration, CalibrationRefused
 from robot.configuration import Configuration
 from robot.sensing.tendon_fit import SweepTooPoor
-from server.calibration import calibrate, calibration_for, robot_name
-from server.calibration_file import (
+from server.calibration.file import (
     CalibrationFileError,
     belonging,
     default_path,
@@ -21,6 +20,7 @@ from server.calibration_file import (
     load_if_there,
     save,
 )
+from server.calibration.sweep import calibrate, calibration_for, robot_name
 from server.command_line import main
 from tests.server import headless
 

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 
 from robot.errors import KeyholeError
-from server import command_line, console_command
+from server import command_line
 from server.command_line import COMMANDS, main
+from server.commands import console as console_command
 from server.configuration_file import load
 from server.supervision.child_process import module_command, module_environment
 from server.version import version

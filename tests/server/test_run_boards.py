@@ -10,9 +10,9 @@ import pytest
 from scenes.boards.board import board
 from scenes.boards.clearance import distances, instrument_axis
 from scenes.experiments import experiment
-from server.headless_run import HeadlessRun
-from server.run_figures import result_document
-from server.run_options import options_for
+from server.run.figures import result_document
+from server.run.headless import HeadlessRun
+from server.run.options import options_for
 from tests import own_kinematics
 from tests.server import headless
 from tests.server.headless import Run

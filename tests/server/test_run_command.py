@@ -18,10 +18,10 @@ from scipy.spatial.transform import Rotation
 from hardware.kinematic_plant import KinematicPlant
 from hardware.plant import Measurement
 from scenes.experiments import experiment, names
-from server import headless_run
 from server.command_line import main
 from server.configuration_file import load
-from server.headless_run import SETTLING_S, TRACE_COLUMNS
+from server.run import headless as headless_run
+from server.run.headless import SETTLING_S, TRACE_COLUMNS
 from server.supervision.child_process import module_command, module_environment
 from tests import own_kinematics
 from tests.server import headless
@@ -344,7 +344,7 @@ def test_what_is_not_text_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_a_start_out_of_reach_is_refused_before_anything_moves(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    default = Path(headless_run.__file__).parents[1] / "robot" / "keyhole.toml"
+    default = Path(__file__).resolve().parents[2] / "robot" / "keyhole.toml"
     text = default.read_text().replace("[0.400, 0.0, 0.120] ", "[1.9, 0.0, 0.1] ")
     file = tmp_path / "far.toml"
     file.write_text(text)

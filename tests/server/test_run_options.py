@@ -12,11 +12,11 @@ import pytest
 
 from robot.errors import UnknownName
 from scenes.experiments import experiment, names
-from server.figure_table import COLUMNS, csv_text, figure, printed
-from server.headless_run import HeadlessRun
-from server.progress_bar import bar, clock
-from server.run_figures import bend_errors
-from server.run_options import RunOptions, cut, options_for
+from server.commands.progress_bar import bar, clock
+from server.run.figure_table import COLUMNS, csv_text, figure, printed
+from server.run.figures import bend_errors
+from server.run.headless import HeadlessRun
+from server.run.options import RunOptions, cut, options_for
 from tests.server import headless
 
 PATH = headless.path([[0, 0, 0, 0], [0.2, 0.001, 0, 0], [0.5, 0, 0, 0]], "short")

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from scenes.experiments import experiment
-from server.headless_run import DETAIL_COLUMNS, HeadlessRun, RunResult
-from server.run_figures import result_document
-from server.run_options import cut, options_for
+from server.run.figures import result_document
+from server.run.headless import DETAIL_COLUMNS, HeadlessRun, RunResult
+from server.run.options import cut, options_for
 from tests.server import headless
 
 

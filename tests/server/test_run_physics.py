@@ -13,9 +13,9 @@ from hardware.physics.plant import PhysicsPlant
 from hardware.plant import Measurement
 from robot.safety import REASONS, Event
 from scenes.experiments import experiment
-from server.headless_run import HeadlessRun, RunResult
-from server.run_figures import result_document
-from server.run_options import cut, options_for
+from server.run.figures import result_document
+from server.run.headless import HeadlessRun, RunResult
+from server.run.options import cut, options_for
 from tests.server import headless
 
 SHORT_S = 1.5

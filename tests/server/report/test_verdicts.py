@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from robot.dexterity import Dexterity
-from server.figure_table import figure
 from server.report import claims as rules
 from server.report.measures import (
     PAPER_TABLE_5,
@@ -21,6 +20,7 @@ from server.report.measures import (
 )
 from server.report.results import SETTINGS, Results, Setting, tasks
 from server.report.targets import TARGETS, Verdict, verdicts
+from server.run.figure_table import figure
 from server.study.folder import StudyFolder
 from server.study.study import StudyResult
 from server.study.task import Task

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from server.headless_run import RunResult
+from server.run.headless import RunResult
 from server.study.folder import StudyFolder, StudyFolderError
 from server.study.program_mark import program_mark
 from server.study.task import Sweep, Task

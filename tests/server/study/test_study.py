@@ -16,9 +16,8 @@ from typing import Any
 import pytest
 
 from robot.errors import KeyholeError
-from server import headless_run
 from server.command_line import main
-from server.study_command import seeds
+from server.commands.study import seeds
 from server.supervision.child_process import module_command, module_environment
 
 PATIENCE_S = 120.0
@@ -144,7 +143,7 @@ def test_an_interrupted_study_ends_in_order(tmp_path: Path) -> None:
 def test_a_run_that_cannot_be_made_is_named_and_the_rest_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    default = Path(headless_run.__file__).parents[1] / "robot" / "keyhole.toml"
+    default = Path(__file__).resolve().parents[3] / "robot" / "keyhole.toml"
     far = tmp_path / "far.toml"
     far.write_text(default.read_text().replace("[0.400, 0.0, 0.120] ", "[1.9, 0.0, 0.1] "))
     arguments = ["study", "--plants", "kinematic", "--experiments", "square", "--config", str(far)]

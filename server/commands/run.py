@@ -15,15 +15,16 @@ from robot.priority.levels import CASE_NAMES
 from scenes.boards.board import BOARD_NAMES
 from scenes.experiments import experiment, names
 from scenes.path_file import parse_csv
-from server import calibration_file
+from server.calibration import file as calibration_file
+from server.commands.progress_bar import ProgressBar
+from server.commands.stop_signals import StopSignals
 from server.configuration_file import load
 from server.control.loop import COORDINATE_NAMES, SOLVER_NAMES
-from server.figure_table import printed
-from server.headless_run import TRACE_COLUMNS, HeadlessRun, RunResult
-from server.progress_bar import ProgressBar
 from server.recording.writer import RecordingWriter
-from server.run_figures import result_document
-from server.run_options import (
+from server.run.figure_table import printed
+from server.run.figures import result_document
+from server.run.headless import TRACE_COLUMNS, HeadlessRun, RunResult
+from server.run.options import (
     COMPENSATIONS,
     PLANTS,
     PRESETS,
@@ -32,7 +33,6 @@ from server.run_options import (
     cut,
     options_for,
 )
-from server.stop_signals import StopSignals
 
 ALL = "all"
 

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from server.console_command import add_page_arguments
+from server.commands.console import add_page_arguments
 
 _DIFFERS = 1
 
@@ -35,8 +35,8 @@ def execute(arguments: argparse.Namespace) -> int:
     """
     if arguments.verify:
         return _verify(arguments.file)
+    from server.commands.console import serve
     from server.configuration_file import load
-    from server.console_command import serve
     from server.recording.reader import Recording
 
     path = arguments.file.absolute()
@@ -48,7 +48,7 @@ def execute(arguments: argparse.Namespace) -> int:
 
 
 def _verify(path: Path) -> int:
-    from server.progress_bar import ProgressBar
+    from server.commands.progress_bar import ProgressBar
     from server.recording.reader import Recording
     from server.recording.verify import report, verify
 

@@ -19,9 +19,9 @@ from robot.safety import REASONS, Event
 from robot.segment import polar
 from scenes.lead_in import anchored
 from scenes.path import Path
-from server.calibration import calibration_for
+from server.calibration.sweep import calibration_for
 from server.control.loop import ControlLoop
-from server.run_options import RunOptions, check_names
+from server.run.options import RunOptions, check_names
 
 TRACE_COLUMNS = (
     ["time_s"]

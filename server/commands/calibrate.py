@@ -8,12 +8,12 @@ import math
 from pathlib import Path
 
 from robot.calibration import Calibration
-from server.calibration import calibrate
-from server.calibration_file import default_path, save
+from server.calibration.file import default_path, save
+from server.calibration.sweep import calibrate
+from server.commands.progress_bar import ProgressBar
+from server.commands.run import seed
 from server.configuration_file import load
-from server.progress_bar import ProgressBar
-from server.run_command import seed
-from server.run_options import PLANTS, PRESETS
+from server.run.options import PLANTS, PRESETS
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

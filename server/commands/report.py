@@ -8,16 +8,16 @@ from pathlib import Path
 
 from robot.configuration import Configuration
 from scenes.experiments import experiment
+from server.commands.stop_signals import StopSignals
+from server.commands.study import add_worker_arguments, calibration_text, seeds
 from server.configuration_file import load
-from server.headless_run import HeadlessRun
 from server.report.results import Results, tasks
-from server.run_options import PLANTS, PRESETS, cut, options_for
-from server.stop_signals import StopSignals
+from server.run.headless import HeadlessRun
+from server.run.options import PLANTS, PRESETS, cut, options_for
 from server.study.folder import StudyFolder
 from server.study.local_workers import default_jobs
 from server.study.program_mark import program_mark
 from server.study.study import Study, StudyResult
-from server.study_command import add_worker_arguments, calibration_text, seeds
 from server.version import version
 
 PAGE = "report.html"

@@ -11,7 +11,7 @@ import hardware.physics
 from robot.calibration import Calibration, CalibrationRefused, parse_calibration
 from robot.configuration import Configuration
 from robot.errors import KeyholeError
-from server.calibration import robot_name
+from server.calibration.sweep import robot_name
 
 _BELONGING = ("arm", "instrument", "module", "tracker", "control")
 """Sections of the configuration that a calibration depends on, beside which robot it is."""

@@ -11,8 +11,8 @@ from robot.configuration import Configuration
 from robot.rotations import logarithm, matrix_from_quaternion
 from robot.segment import tip_rotation
 from scenes.boards.board import board
-from server.headless_run import DETAIL_COLUMNS, RunResult
-from server.run_options import RunOptions
+from server.run.headless import DETAIL_COLUMNS, RunResult
+from server.run.options import RunOptions
 
 _DETAIL = {name: place for place, name in enumerate(DETAIL_COLUMNS)}
 

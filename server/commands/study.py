@@ -11,11 +11,11 @@ from robot.configuration import Configuration
 from robot.errors import KeyholeError
 from robot.priority.levels import CASE_NAMES
 from scenes.experiments import names
+from server.commands.run import given_calibration, positive, seed
+from server.commands.stop_signals import StopSignals
 from server.configuration_file import load
-from server.figure_table import printed
-from server.run_command import given_calibration, positive, seed
-from server.run_options import COMPENSATIONS, PLANTS, PRESETS
-from server.stop_signals import StopSignals
+from server.run.figure_table import printed
+from server.run.options import COMPENSATIONS, PLANTS, PRESETS
 from server.study.folder import StudyFolder
 from server.study.local_workers import default_jobs
 from server.study.study import TABLE, Study, StudyResult

@@ -1,0 +1,1 @@
+"""The subcommands of ``keyhole``: a module each, with ``add_parser`` and ``execute``."""

@@ -1,0 +1,1 @@
+"""Headless runs: what is asked for, the run, and its figures."""
