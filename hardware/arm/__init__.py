@@ -1,0 +1,1 @@
+"""The arm that carries the instrument module: locked, simulated, or a real xArm 7."""
