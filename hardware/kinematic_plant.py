@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hardware.plant import Actuator, Measurement, PlantSpec
+from hardware.wireless import Wireless
 from robot.configuration import Configuration
 from robot.forward import ForwardKinematics
 from robot.parameters import parameters
@@ -14,7 +15,7 @@ from robot.urdf import urdf_text
 from scenes.boards.board import Board
 
 
-class KinematicPlant:
+class KinematicPlant(Wireless):
     """Joints and servos that stand exactly where the last command put them."""
 
     def __init__(self, configuration: Configuration, x: np.ndarray) -> None:
@@ -33,7 +34,7 @@ class KinematicPlant:
         servo_angles(x[7], x[8], self._pitch, self._pulley, self._servo)
         self._next_q, self._next_servo = self._q.copy(), self._servo.copy()
         self._measurement = Measurement(
-            self._q, self._servo, np.zeros(SERVOS), np.zeros((), TRACKER)
+            self._q, self._servo, np.zeros(SERVOS), np.zeros((), TRACKER), np.zeros(SERVOS)
         )
 
     def read(self) -> Measurement:

@@ -40,20 +40,25 @@ class Measurement(NamedTuple):
         servo: (4,) servo angles, rad.
         tension: (4,) tendon tension, N.
         tracker: () ``robot.records.TRACKER``: the newest tip pose, ``sequence`` 0 without one.
+        load: (4,) load of each servo, share of its largest, -1 to 1.
         contact_n: largest contact force on the instrument that a sensor reads, N.
         valid: whether every device answered.
         age_s: age of the oldest value, s.
-        failed: whether the plant broke down and moves no more.
+        event: the :class:`robot.safety.Event` that a device tells as long as its cause lasts; 0 for
+            none.
+        readiness: the :class:`robot.records.Readiness` of the devices.
     """
 
     q: np.ndarray
     servo: np.ndarray
     tension: np.ndarray
     tracker: np.ndarray
+    load: np.ndarray
     contact_n: float = 0.0
     valid: bool = True
     age_s: float = 0.0
-    failed: bool = False
+    event: int = 0
+    readiness: int = 0
 
 
 class Plant(Protocol):
@@ -74,7 +79,23 @@ class Plant(Protocol):
         """Stay where it is, under torque."""
 
     def release(self) -> None:
-        """Let go of torque. A separate act, never a default."""
+        """Let go of torque on every device, also past one that does not answer. A separate act,
+        never a default.
+        """
+
+    def take_hold(self) -> None:
+        """Put torque on where it stands, after :meth:`release`."""
+
+    def home(self) -> None:
+        """Begin to find the tendons' zero; ``readiness`` tells when it is done. Only while the
+        robot is DISABLED.
+        """
+
+    def reboot(self) -> None:
+        """Start devices anew that took themselves out of service. Only while nothing moves."""
+
+    def fill_devices(self, devices: np.ndarray) -> None:
+        """Fill a (1,) ``hardware.devices.DEVICES``: what people want to know of the devices."""
 
     def close(self) -> None:
         """Give the devices back."""

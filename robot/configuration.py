@@ -21,6 +21,10 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0, le=2, allow_inf_nan=False)]
 Vector = tuple[Finite, Finite, Finite]
+Percent = Annotated[float, Field(gt=0, le=100)]
+ServoId = Annotated[int, Field(ge=0, le=252)]
+Sign = Literal[-1, 1]
+DriveName = Literal["both", "arm", "segment", "none"]
 BreathingAmplitude = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False)]
 BreathingPeriod = Annotated[float, Field(ge=1, le=20, allow_inf_nan=False)]
 
@@ -101,7 +105,7 @@ class Module(Section):
     bend_direction: Direction
     pulley_radius_m: Length
     servo_ticks_per_turn: Annotated[int, Field(ge=64, le=2**22)]
-    servo_range_deg: Annotated[float, Field(gt=0, le=360)]
+    servo_range_deg: Annotated[float, Field(gt=0, le=170)]
     servo_speed_deg_s: Annotated[float, Field(gt=0, le=2000)]
     adapter_size_m: tuple[Length, Length]
     mass_kg: Positive
@@ -128,12 +132,27 @@ class Limits(Section):
     tip_jump_deg: Positive
     target_distance_mm: Positive
     tracking_error_rad: Positive
+    servo_tracking_error_deg: Positive
     contact_force_n: Positive
+    tip_acceleration_mm_s2: Positive
+    tip_angular_acceleration_deg_s2: Positive
+    workspace_min_m: Vector
+    workspace_max_m: Vector
+    clearance_mm: Annotated[float, Field(ge=-1000, le=1000)]
+    trocar_distance_mm: Positive
+    late_tick_ms: Positive
 
     @model_validator(mode="after")
     def _lambda_interval(self) -> Limits:
         if self.lambda_min >= self.lambda_max:
             raise ValueError("lambda_min must be below lambda_max")
+        return self
+
+    @model_validator(mode="after")
+    def _workspace_box(self) -> Limits:
+        corners = zip(self.workspace_min_m, self.workspace_max_m, strict=True)
+        if not all(low < high for low, high in corners):
+            raise ValueError("workspace_min_m must be below workspace_max_m on every axis")
         return self
 
 
@@ -225,12 +244,71 @@ class Tracker(Section):
     correction_gain: Annotated[float, Field(gt=0, le=1)]
 
 
+class Hardware(Section):
+    """Which parts of the robot are real. Without a connection all of it is simulated."""
+
+    connected: bool
+    arm: Literal["simulated", "locked", "xarm"]
+    arm_address: str
+    arm_rate_hz: Annotated[float, Field(ge=10, le=250)]
+
+
+class Servos(Section):
+    """The servo bus, its four servos, and how they are homed."""
+
+    port: str
+    baud_rate: Literal[9600, 57600, 115200, 1000000, 2000000, 3000000, 4000000]
+    ids: tuple[ServoId, ServoId, ServoId, ServoId]
+    directions: tuple[Sign, Sign, Sign, Sign]
+    rate_hz: Annotated[float, Field(ge=10, le=1000)]
+    profile_velocity_deg_s: Annotated[float, Field(gt=0, le=1000)]
+    watchdog_ms: Annotated[int, Field(ge=20, le=2540)]
+    homing_speed_deg_s: Annotated[float, Field(gt=0, le=90)]
+    homing_range_deg: Annotated[float, Field(gt=0, le=170)]
+    taut_load_percent: Percent
+    pretension_load_percent: Percent
+    load_limit_percent: Percent
+    temperature_limit_c: Annotated[float, Field(gt=0, le=80)]
+    voltage_min_v: Positive
+    voltage_max_v: Positive
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Servos:
+        if len(set(self.ids)) != len(self.ids):
+            raise ValueError("ids must differ from each other")
+        if not self.taut_load_percent <= self.pretension_load_percent < self.load_limit_percent:
+            raise ValueError(
+                "taut_load_percent <= pretension_load_percent < load_limit_percent must hold"
+            )
+        if self.voltage_min_v >= self.voltage_max_v:
+            raise ValueError("voltage_min_v must be below voltage_max_v")
+        return self
+
+
+class Stylus(Section):
+    """A haptic stylus behind a rosbridge, what its buttons mean, and the force that it renders."""
+
+    source: Literal["off", "rosbridge"]
+    url: str
+    pose_topic: str
+    buttons_topic: str
+    force_topic: str
+    servo_command_topic: str
+    first_button: DriveName
+    second_button: DriveName
+    both_buttons: DriveName
+    timeout_ms: Positive
+    force_stiffness_n_m: NotNegative
+    force_limit_n: Annotated[float, Field(ge=0, le=3.3)]
+
+
 class Server(Section):
     """The one public port."""
 
     host: str
     port: Annotated[int, Field(ge=0, le=65535)]
     lease_seconds: Annotated[float, Field(ge=1, le=600)]
+    session_hours: Annotated[float, Field(gt=0, le=8760)]
 
 
 class Joint(Section):
@@ -265,6 +343,7 @@ class Arm(Section):
     """The seven joints and eight links (the first is the base)."""
 
     name: str
+    link_radii_m: tuple[Length, Length, Length, Length, Length, Length, Length]
     joints: Annotated[tuple[Joint, ...], Field(min_length=7, max_length=7)]
     links: Annotated[tuple[Link, ...], Field(min_length=8, max_length=8)]
 
@@ -285,6 +364,9 @@ class Configuration(Section):
     simulation: Simulation
     compensation: Compensation
     tracker: Tracker
+    hardware: Hardware
+    servos: Servos
+    stylus: Stylus
     server: Server
     arm: Arm
 

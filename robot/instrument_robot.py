@@ -10,6 +10,7 @@ import numpy as np
 
 from robot.arm import Arm
 from robot.calibration import Calibration
+from robot.clearance import measure_clearance
 from robot.configuration import Configuration
 from robot.instrument_tick import (
     SOLVE_CLOSED_FORM,
@@ -61,6 +62,9 @@ class _Work:
         self.lower = np.full(21, -1e30)
         self.left_over = np.zeros(2)
         self.q = np.zeros(7)
+        self.measured_q = np.zeros(7)
+        self.joints = np.zeros((8, 3))
+        self.flange = np.zeros((3, 3))
 
 
 class InstrumentRobot:
@@ -101,6 +105,7 @@ class InstrumentRobot:
         """The (1,) state in which the robot wakes up: DISABLED at the start, or at ``x`` (10,)."""
         outcome, tick_input = np.zeros(1, OUTCOME), np.zeros(1, INPUT)
         outcome["state"]["x"] = self._start if x is None else x
+        tick_input["measured_q"] = outcome["state"]["x"][:, :7]
         tick_input["trocar_position"] = self.configuration.trocar.position_m
         self._conclude(outcome, tick_input)
         wake(outcome, self.parameters)
@@ -156,10 +161,13 @@ class InstrumentRobot:
         )
 
     def _conclude(self, outcome: np.ndarray, tick_input: np.ndarray) -> None:
-        arm, q = self._arm, self._work.q
-        copy_joints(outcome, q)
-        arm.update(q)
+        arm, work = self._arm, self._work
+        measures = copy_joints(outcome, tick_input, work.q, work.measured_q)
+        arm.update(work.q)
         conclude(outcome, tick_input, arm.position, arm.rotation, arm.jacobian, self.parameters)
+        if measures:
+            arm.place(work.measured_q, work.joints, work.flange)
+            measure_clearance(outcome, tick_input, work.joints, work.flange, self.parameters)
 
     def _closed_form(self, case: int, tick_input: np.ndarray, outcome: np.ndarray) -> np.ndarray:
         work, settings = self._work, tick_input["settings"][0]

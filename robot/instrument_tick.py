@@ -6,14 +6,15 @@ import math
 
 import numpy as np
 
+from robot.clearance import EVERY_TICKS
 from robot.commands import tip_twist
 from robot.compensation import SHARE_RATE, commanded_bend, follow_friction, follow_setting
 from robot.compiled import compiled
 from robot.instrument import project_on_shaft, rcm_jacobian, shaft, tip, tip_jacobian
 from robot.priority.levels import assemble
-from robot.priority.limits import active_limits, lock_arm, rate_limits
+from robot.priority.limits import active_limits, lock_arm, lock_segment, rate_limits
 from robot.priority.meet_all import meet_all
-from robot.records import Case, LeaderKind, Safety, Solver
+from robot.records import Case, DriveMode, LeaderKind, Safety, Solver
 from robot.rotations import angle_between, quaternion_from_matrix
 from robot.safety import Event, apply_event, decide
 from robot.segment import polar
@@ -31,6 +32,7 @@ _ENABLED = int(Safety.ENABLED)
 _HQP, _AUGMENTED = int(Solver.HQP), int(Solver.AUGMENTED)
 _SOLVER_FAILED = int(Event.SOLVER_FAILED)
 _PATH = int(LeaderKind.PATH)
+_ARM, _SEGMENT = int(DriveMode.ARM), int(DriveMode.SEGMENT)
 _BALANCED = int(Case.BALANCED)
 _CORRECTIONS_PER_TICK = 0.5
 """Largest share of the deviation at the trocar that one tick takes back."""
@@ -241,8 +243,11 @@ def _levels_and_limits(
     count, levels = sizes[case, 0], sizes[case, 1]
     x, dt = outcome[0].state.x, tick_input[0].dt_s
     upper[10] = rate_limits(x, dt, parameters, lower, upper, matrix[0])
-    if tick_input[0].settings.lock_arm != 0:
+    mode = outcome[0].state.mode
+    if tick_input[0].settings.lock_arm != 0 or mode == _SEGMENT:
         lock_arm(lower, upper)
+    if mode == _ARM:
+        lock_segment(lower, upper)
     assemble(
         catalogue,
         targets,
@@ -382,10 +387,21 @@ def wake(outcome: np.ndarray, parameters: np.ndarray) -> None:
     s = outcome[0].state
     start_correction(s)
     s.contact_allowance = parameters[0].contact_force
+    s.clearance_allowance = parameters[0].clearance
 
 
 @compiled
-def copy_joints(outcome: np.ndarray, q: np.ndarray) -> None:
-    """Copy the commanded joint angles to ``q`` (7,): cheaper than a view into the record."""
+def copy_joints(
+    outcome: np.ndarray, tick_input: np.ndarray, q: np.ndarray, measured_q: np.ndarray
+) -> bool:
+    """Copy the commanded and the measured joint angles (7,): cheaper than views into the records.
+
+    Returns:
+        Whether clearances are to be measured in this tick.
+    """
+    total = 0.0
     for i in range(7):
         q[i] = outcome[0].state.x[i]
+        measured_q[i] = tick_input[0].measured_q[i]
+        total += measured_q[i]
+    return bool(outcome[0].state.tick % EVERY_TICKS == 0 and math.isfinite(total))

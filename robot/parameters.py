@@ -30,6 +30,19 @@ PARAMETERS = np.dtype(
         ("jump_angle", "f8"),
         ("target_distance", "f8"),
         ("tracking_error", "f8"),
+        ("servo_tracking_error", "f8"),
+        ("acceleration_max", "f8"),
+        ("angular_acceleration_max", "f8"),
+        ("workspace_min", "f8", 3),
+        ("workspace_max", "f8", 3),
+        ("wall_normal", "f8", 3),
+        ("wall_radius", "f8"),
+        ("wall_thickness", "f8"),
+        ("link_radius", "f8", 7),
+        ("module_radius", "f8"),
+        ("clearance", "f8"),
+        ("trocar_distance", "f8"),
+        ("late_tick", "f8"),
         ("contact_force", "f8"),
         ("tracker_delay", "f8"),
         ("correction_gain", "f8"),
@@ -63,6 +76,10 @@ def _module_rotation(configuration: Configuration) -> np.ndarray:
     x = np.array(configuration.module.bend_direction)
     z, x = z / np.linalg.norm(z), x / np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
+
+
+def _unit_vector(vector: tuple[float, float, float]) -> np.ndarray:
+    return np.array(vector) / np.linalg.norm(vector)
 
 
 def _degrees(value: float) -> float:
@@ -106,6 +123,19 @@ def parameters(configuration: Configuration, calibration: Calibration | None = N
         "jump_angle": _degrees(limits.tip_jump_deg),
         "target_distance": limits.target_distance_mm * 1e-3,
         "tracking_error": limits.tracking_error_rad,
+        "servo_tracking_error": _degrees(limits.servo_tracking_error_deg),
+        "acceleration_max": limits.tip_acceleration_mm_s2 * 1e-3,
+        "angular_acceleration_max": _degrees(limits.tip_angular_acceleration_deg_s2),
+        "workspace_min": limits.workspace_min_m,
+        "workspace_max": limits.workspace_max_m,
+        "wall_normal": _unit_vector(configuration.trocar.wall_normal),
+        "wall_radius": configuration.trocar.wall_radius_m,
+        "wall_thickness": configuration.trocar.wall_thickness_m,
+        "link_radius": configuration.arm.link_radii_m,
+        "module_radius": 0.5 * max(module.adapter_size_m),
+        "clearance": limits.clearance_mm * 1e-3,
+        "trocar_distance": limits.trocar_distance_mm * 1e-3,
+        "late_tick": limits.late_tick_ms * 1e-3,
         "contact_force": limits.contact_force_n,
         "tracker_delay": configuration.tracker.delay_ms * 1e-3,
         "correction_gain": configuration.tracker.correction_gain,

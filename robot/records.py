@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 RecordFields: TypeAlias = Any
 """A record or part of one inside compiled code, where its fields are attributes."""
@@ -54,6 +54,20 @@ class Refusal(IntEnum):
     TARGET_TOO_FAR = 1
     NOT_ALIGNED = 2
     HOLD_NOT_PRESSED = 3
+    OUTSIDE_WORKSPACE = 4
+    BEHIND_TROCAR = 5
+
+
+class Readiness(IntEnum):
+    """Why the robot could not be enabled now (``readiness``)."""
+
+    READY = 0
+    NOT_CONNECTED = 1
+    NOT_HOMED = 2
+    BUSY = 3
+    TORQUE_OFF = 4
+    DEVICE_FAULT = 5
+    OUTSIDE_LIMITS = 6
 
 
 class LeaderKind(IntEnum):
@@ -64,6 +78,16 @@ class LeaderKind(IntEnum):
     API_POSE = 2
     API_TARGET = 3
     PATH = 4
+    STYLUS = 5
+    GAMEPAD = 6
+
+
+class DriveMode(IntEnum):
+    """What a leader drives: arm and segment together, or one of them alone (paper 1, 3.1)."""
+
+    BOTH = 0
+    ARM = 1
+    SEGMENT = 2
 
 
 class Case(IntEnum):
@@ -139,6 +163,7 @@ LEADER = np.dtype(
         ("sequence", "i8"),
         ("clutch", "i8"),
         ("absolute", "i8"),
+        ("mode", "i8"),
         ("age_s", "f8"),
         ("timeout_s", "f8"),
         ("smoothing_s", "f8"),
@@ -147,8 +172,9 @@ LEADER = np.dtype(
     ]
 )
 """The newest sample of the active leader. ``absolute``: the pose is a tip pose in the base frame
-rather than a motion relative to the clutch's anchor. ``smoothing_s``: time constant over which
-coarse samples are interpolated; 0 takes them as they are."""
+rather than a motion relative to the clutch's anchor. ``mode``: a :class:`DriveMode`.
+``smoothing_s``: time constant over which coarse samples are interpolated; 0 takes them as they
+are."""
 
 TRACKER = np.dtype(
     [
@@ -171,8 +197,11 @@ INPUT = np.dtype(
         ("measured_q", "f8", ARM_JOINTS),
         ("measured_servo", "f8", SERVOS),
         ("measured_tension", "f8", SERVOS),
+        ("measured_load", "f8", SERVOS),
         ("measured_contact", "f8"),
-        ("plant_failed", "i8"),
+        ("plant_event", "i8"),
+        ("readiness", "i8"),
+        ("late_s", "f8"),
         ("tracker", TRACKER),
         ("trocar_position", "f8", 3),
         ("trocar_velocity", "f8", 3),
@@ -181,9 +210,11 @@ INPUT = np.dtype(
     ]
 )
 
-"""What a tick is told. ``measured_tension`` in N; ``measured_contact``: largest force in N on the
-instrument that a sensor of the scene reads, 0 without one; ``plant_failed``: the simulation broke
-down."""
+"""What a tick is told. ``measured_tension`` in N; ``measured_load``: of each servo, share of its
+largest, -1 to 1; ``measured_contact``: largest force in N on the instrument that a sensor of the
+scene reads, 0 without one; ``plant_event``: the :class:`robot.safety.Event` that the plant tells
+now, 0 for none; ``readiness``: a :class:`Readiness`; ``late_s``: how long after its deadline the
+tick began."""
 
 STATE = np.dtype(
     [
@@ -219,6 +250,15 @@ STATE = np.dtype(
         ("correction_position", "f8", 3),
         ("correction_rotation", "f8", 3),
         ("contact_allowance", "f8"),
+        ("target_position", "f8", 3),
+        ("target_rotation", "f8", (3, 3)),
+        ("desired_velocity", "f8", 3),
+        ("desired_angular_velocity", "f8", 3),
+        ("mode", "i8"),
+        ("clearance", "f8"),
+        ("clearance_part", "i8"),
+        ("clearance_allowance", "f8"),
+        ("trocar_distance", "f8"),
     ]
 )
 """Everything the robot remembers. ``x`` is the commanded configuration; the ``arm_*`` and ``tip_*``
@@ -228,7 +268,12 @@ rows linear then angular, of the point that coincides with the base origin, base
 ``compensation``: shares of gain and friction that are made up for;
 ``lagged_*``: the commanded tip as old as the tracker's samples; ``correction_*``: what the tracker
 says that the commanded tip is off (m, rotation vector in rad, base frame); ``contact_allowance``:
-the contact force in N above which motion pauses."""
+the contact force in N above which motion pauses; ``target_*``: where the leader wants the tip;
+``desired_*velocity``: how the desired pose moved in the last tick (m/s, rad/s, base frame);
+``mode``: the :class:`DriveMode` in force; ``clearance``: smallest distance in m between arm, shaft
+and body wall where they were measured, of the pair ``clearance_part`` (see
+``robot.clearance``); ``clearance_allowance``: the clearance below which motion pauses;
+``trocar_distance``: of the measured shaft from the trocar, m."""
 
 COMMAND = np.dtype(
     [

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from robot.compensation import expected_bend, follow_setting
+from robot.compensation import commanded_bend, expected_bend, follow_setting
 from robot.compiled import compiled
 from robot.errors import KeyholeError
 from robot.records import RecordFields, Request, Safety
-from robot.tendons import bend_from_servos
+from robot.tendons import bend_from_servos, servo_angles
 
 
 class Event(IntEnum):
@@ -38,6 +38,15 @@ class Event(IntEnum):
     CONTROL_FAILED = 13
     CONTACT_FORCE = 14
     SIMULATION_FAILED = 15
+    BUS_LOST = 16
+    SERVO_SILENT = 17
+    SERVO_FAULT = 18
+    ARM_LOST = 19
+    ARM_FAULT = 20
+    DEVICES_BACK = 21
+    CLEARANCE = 22
+    TROCAR_LEFT = 23
+    CONTROL_LATE = 24
 
 
 class Transition(NamedTuple):
@@ -81,6 +90,23 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition(_D, Event.SIMULATION_FAILED, _F),
     Transition(_E, Event.SIMULATION_FAILED, _F),
     Transition(_P, Event.SIMULATION_FAILED, _F),
+    Transition(_E, Event.BUS_LOST, _P),
+    Transition(_P, Event.BUS_LOST, _P),
+    Transition(_D, Event.SERVO_SILENT, _F),
+    Transition(_E, Event.SERVO_SILENT, _F),
+    Transition(_P, Event.SERVO_SILENT, _F),
+    Transition(_D, Event.SERVO_FAULT, _F),
+    Transition(_E, Event.SERVO_FAULT, _F),
+    Transition(_P, Event.SERVO_FAULT, _F),
+    Transition(_E, Event.ARM_LOST, _P),
+    Transition(_P, Event.ARM_LOST, _P),
+    Transition(_D, Event.ARM_FAULT, _F),
+    Transition(_E, Event.ARM_FAULT, _F),
+    Transition(_P, Event.ARM_FAULT, _F),
+    Transition(_P, Event.DEVICES_BACK, _P),
+    Transition(_E, Event.CLEARANCE, _P),
+    Transition(_E, Event.TROCAR_LEFT, _F),
+    Transition(_E, Event.CONTROL_LATE, _P),
 )
 """Every transition there is. An event that is not listed for a state leaves the state as it is; if
 it was an operator's request, it is refused."""
@@ -110,6 +136,39 @@ REASONS: dict[Event, tuple[str, str]] = {
     Event.SIMULATION_FAILED: (
         "the simulation broke down and stands still",
         "restart the console; tell what led to it",
+    ),
+    Event.BUS_LOST: (
+        "the servo bus is gone; the servos hold by themselves",
+        "plug it in again: it is found by itself; then enable",
+    ),
+    Event.SERVO_SILENT: (
+        "a servo does not answer",
+        "check its cable and its power, then reset",
+    ),
+    Event.SERVO_FAULT: (
+        "a servo reports a fault",
+        "read which under Devices, take the cause away, reboot it, then reset",
+    ),
+    Event.ARM_LOST: (
+        "the connection to the arm is gone",
+        "check its cable and its controller; then enable",
+    ),
+    Event.ARM_FAULT: (
+        "the arm's controller reports an error",
+        "read which under Devices, take the cause away, then reset",
+    ),
+    Event.DEVICES_BACK: ("all devices are back; nothing moves by itself", "enable to go on"),
+    Event.CLEARANCE: (
+        "arm, module or shaft come too near to each other or to the body wall",
+        "enable, then move away",
+    ),
+    Event.TROCAR_LEFT: (
+        "the shaft was measured beside the trocar",
+        "look what pushes the arm, then reset",
+    ),
+    Event.CONTROL_LATE: (
+        "a tick of the control loop came much too late",
+        "close what else works on this computer, then enable",
     ),
 }
 """For each event that led into the present state: why, and what to do."""
@@ -177,8 +236,12 @@ _STALE, _LOST, _TRACKING = (
     int(Event.MEASUREMENT_LOST),
     int(Event.TRACKING_ERROR),
 )
-_CONTACT, _SIMULATION = int(Event.CONTACT_FORCE), int(Event.SIMULATION_FAILED)
+_CONTACT = int(Event.CONTACT_FORCE)
+_BUS_LOST, _ARM_LOST, _BACK = int(Event.BUS_LOST), int(Event.ARM_LOST), int(Event.DEVICES_BACK)
+_CLEARANCE, _TROCAR, _LATE = int(Event.CLEARANCE), int(Event.TROCAR_LEFT), int(Event.CONTROL_LATE)
+_PAUSED = int(_P)
 _CONTACT_MARGIN = 1.25
+_CLEARANCE_MARGIN = 0.001
 MEASUREMENT_TIMEOUT_S = 0.05
 
 
@@ -200,6 +263,21 @@ def tracking_distance(x: np.ndarray, measured_q: np.ndarray) -> float:
     largest = 0.0
     for i in range(7):
         largest = max(largest, abs(x[i] - measured_q[i]))
+    return largest
+
+
+@compiled
+def servo_tracking_distance(
+    s: RecordFields, measured_servo: np.ndarray, parameters: np.ndarray
+) -> float:
+    """Largest distance in rad between commanded and measured servo angles."""
+    p = parameters[0]
+    told, servo = np.empty(2), np.empty(4)
+    commanded_bend(s, parameters, told)
+    servo_angles(told[0], told[1], p.pitch_radius, p.pulley_radius, servo)
+    largest = 0.0
+    for i in range(4):
+        largest = max(largest, abs(servo[i] - measured_servo[i]))
     return largest
 
 
@@ -233,6 +311,65 @@ def _watch_contact(outcome: np.ndarray, i: RecordFields, p: RecordFields) -> Non
 
 
 @compiled
+def _watch_clearance(outcome: np.ndarray, i: RecordFields, p: RecordFields) -> None:
+    """Pause where arm, shaft and wall come too near; fault where the shaft left the trocar.
+
+    Whoever enables too near may move on as long as it does not come nearer still.
+    """
+    s = outcome[0].state
+    if i.request == _ENABLE:
+        s.clearance_allowance = min(p.clearance, s.clearance - _CLEARANCE_MARGIN)
+    if s.clearance >= p.clearance:
+        s.clearance_allowance = p.clearance
+    if not s.clearance >= s.clearance_allowance:
+        apply_event(outcome, _CLEARANCE)
+    if not s.trocar_distance <= p.trocar_distance:
+        apply_event(outcome, _TROCAR)
+
+
+@compiled
+def _request(outcome: np.ndarray, i: RecordFields) -> bool:
+    """Apply this tick's request; True if the robot must take the measured joints as its own.
+
+    Nobody enables a robot that is not ready; the server says why.
+    """
+    s = outcome[0].state
+    before, reason = s.safety, s.reason
+    if i.request == 0 or (i.request == _ENABLE and i.readiness != 0):
+        return False
+    apply_event(outcome, i.request)
+    if i.request != _ENABLE or s.safety != _ENABLED:
+        return False
+    # While a device was gone, its axes were stopped by themselves, wherever that was.
+    was_gone = reason in (_BUS_LOST, _ARM_LOST, _BACK)
+    return bool(before == _DISABLED or (before == _PAUSED and was_gone))
+
+
+@compiled
+def _take_measured(outcome: np.ndarray, i: RecordFields, parameters: np.ndarray) -> None:
+    """Take the measured joints and servos as the commanded ones."""
+    s = outcome[0].state
+    p = parameters[0]
+    for k in range(7):
+        s.x[k] = i.measured_q[k]
+    u, v = bend_from_servos(i.measured_servo, p.pitch_radius, p.pulley_radius)
+    follow_setting(s, i.settings.compensation, 1.0)
+    expected_bend(s, u, v, parameters)
+
+
+@compiled
+def _plant_speaks(outcome: np.ndarray, i: RecordFields) -> bool:
+    """Apply what the plant tells, or that all its devices are back; True if it tells anything."""
+    s = outcome[0].state
+    if i.plant_event != 0:
+        apply_event(outcome, i.plant_event)
+        return True
+    if s.reason in (_BUS_LOST, _ARM_LOST) and i.readiness == 0:
+        apply_event(outcome, _BACK)
+    return False
+
+
+@compiled
 def decide(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) -> bool:
     """Apply this tick's request and what the measurement tells to the state in ``outcome``.
 
@@ -248,24 +385,24 @@ def decide(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) 
     s = outcome[0].state
     i = tick_input[0]
     p = parameters[0]
-    before = s.safety
-    if i.request != 0:
-        apply_event(outcome, i.request)
-    if i.plant_failed != 0:
-        apply_event(outcome, _SIMULATION)
+    takes_measured = _request(outcome, i)
+    if _plant_speaks(outcome, i):
         return False
     if not _measured(i):
         apply_event(outcome, _LOST)
         return False
+    if not i.late_s <= p.late_tick:
+        apply_event(outcome, _LATE)
     _watch_contact(outcome, i, p)
-    if before == _DISABLED and s.safety == _ENABLED:
-        for k in range(7):
-            s.x[k] = i.measured_q[k]
-        u, v = bend_from_servos(i.measured_servo, p.pitch_radius, p.pulley_radius)
-        follow_setting(s, i.settings.compensation, 1.0)
-        expected_bend(s, u, v, parameters)
+    _watch_clearance(outcome, i, p)
+    if takes_measured and s.safety == _ENABLED:
+        _take_measured(outcome, i, parameters)
         return True
-    if not tracking_distance(s.x, i.measured_q) <= p.tracking_error:
+    follows = tracking_distance(s.x, i.measured_q) <= p.tracking_error
+    if not (
+        follows
+        and servo_tracking_distance(s, i.measured_servo, parameters) <= p.servo_tracking_error
+    ):
         apply_event(outcome, _TRACKING)
     # A leader that opened its clutch or gave way to another has left; its age is no matter.
     leads = s.engaged != 0 and i.leader.clutch != 0 and i.leader.kind == s.leader_kind

@@ -34,6 +34,9 @@ from robot.safety import Event, apply_event
 from robot.sensing.tip_correction import expected_tip
 
 _ENABLED = int(Safety.ENABLED)
+_ARRIVED_M, _ARRIVED_RAD = 1e-9, 1e-9
+_UNDER_WALL_M = 0.003
+"""How far under the body wall a target must stay."""
 _MATCHED = int(Alignment.MATCHED)
 _JUMP, _INVALID = int(Event.LEADER_JUMP), int(Event.LEADER_INVALID)
 _GIZMO, _PATH = int(LeaderKind.GIZMO), int(LeaderKind.PATH)
@@ -42,6 +45,7 @@ _TOO_FAR, _NOT_ALIGNED, _NO_HOLD = (
     int(Refusal.NOT_ALIGNED),
     int(Refusal.HOLD_NOT_PRESSED),
 )
+_OUTSIDE, _BEHIND = int(Refusal.OUTSIDE_WORKSPACE), int(Refusal.BEHIND_TROCAR)
 
 
 @compiled
@@ -130,43 +134,84 @@ def relative_target(
 
 
 @compiled
+def limited_step(
+    to_target: np.ndarray,
+    distance: float,
+    target_speed: float,
+    velocity: np.ndarray,
+    dt: float,
+    speed: float,
+    acceleration: float,
+) -> None:
+    """The next step of the desired pose toward its target, in place in ``to_target`` (3,).
+
+    No faster than ``speed``; no faster than a stop at the target allows, the target itself moving
+    at ``target_speed``; and no further from the last ``velocity`` (3,), which it replaces, than
+    ``acceleration`` permits. The same for metres and for radians.
+    """
+    allowed = min(speed, target_speed + math.sqrt(2.0 * acceleration * distance))
+    share = 1.0 if distance <= allowed * dt else allowed * dt / distance
+    change = 0.0
+    for i in range(3):
+        to_target[i] *= share
+        change += (to_target[i] / dt - velocity[i]) ** 2
+    change = math.sqrt(change)
+    if change > acceleration * dt:
+        kept = acceleration * dt / change
+        for i in range(3):
+            to_target[i] = dt * (velocity[i] + kept * (to_target[i] / dt - velocity[i]))
+    for i in range(3):
+        velocity[i] = to_target[i] / dt
+
+
+@compiled
 def approach(
     s: RecordFields,
     target_position: np.ndarray,
     target_rotation: np.ndarray,
     dt: float,
     smoothing_s: float,
-    speed: float,
-    angular_speed: float,
+    p: RecordFields,
 ) -> None:
-    """Move the desired pose toward the target: smoothed over ``smoothing_s``, limited in speed."""
+    """Move the desired pose toward the target: smoothed, limited in speed and acceleration.
+
+    Args:
+        s: the state that is changed.
+        target_position: (3,) base frame, m.
+        target_rotation: (3, 3) base frame.
+        dt: s.
+        smoothing_s: time constant over which coarse samples are interpolated; 0 for none.
+        p: parameters with the limits.
+    """
     share = 1.0 if smoothing_s <= 0.0 else 1.0 - math.exp(-dt / smoothing_s)
+    step, vector, turn = np.empty(3), np.empty(3), np.empty((3, 3))
     distance = share * _distance(target_position, s.desired_position)
-    scale = share if distance <= speed * dt else share * speed * dt / distance
-    if scale == 1.0:
+    moves = _distance(target_position, s.target_position) / dt
+    for i in range(3):
+        step[i] = share * (target_position[i] - s.desired_position[i])
+    limited_step(step, distance, moves, s.desired_velocity, dt, p.speed_max, p.acceleration_max)
+    if share == 1.0 and _distance(target_position, s.desired_position + step) < _ARRIVED_M:
         for i in range(3):
             s.desired_position[i] = target_position[i]
     else:
         for i in range(3):
-            s.desired_position[i] += scale * (target_position[i] - s.desired_position[i])
-    vector = np.empty(3)
+            s.desired_position[i] += step[i]
     angle = share * rotation_error(target_rotation, s.desired_rotation, vector)
-    scale = share if angle <= angular_speed * dt else share * angular_speed * dt / angle
-    if scale == 1.0:
-        for i in range(3):
-            for j in range(3):
-                s.desired_rotation[i, j] = target_rotation[i, j]
-    elif angle > 0.0:
-        step = np.empty((3, 3))
-        turned = np.empty((3, 3))
-        for i in range(3):
-            vector[i] *= scale
-        exponential(vector, step)
-        multiply(step, s.desired_rotation, turned)
-        orthonormalize(turned)
-        for i in range(3):
-            for j in range(3):
-                s.desired_rotation[i, j] = turned[i, j]
+    turns = angle_between(target_rotation, s.target_rotation) / dt
+    for i in range(3):
+        vector[i] *= share
+    velocity, limit = s.desired_angular_velocity, p.angular_acceleration_max
+    limited_step(vector, angle, turns, velocity, dt, p.angular_speed_max, limit)
+    exponential(vector, turn)
+    turned = np.empty((3, 3))
+    multiply(turn, s.desired_rotation, turned)
+    orthonormalize(turned)
+    arrived = share == 1.0 and angle_between(target_rotation, turned) < _ARRIVED_RAD
+    for i in range(3):
+        s.target_position[i] = target_position[i]
+        for j in range(3):
+            s.desired_rotation[i, j] = target_rotation[i, j] if arrived else turned[i, j]
+            s.target_rotation[i, j] = target_rotation[i, j]
 
 
 @compiled
@@ -174,7 +219,14 @@ def release(s: RecordFields) -> None:
     """Open the clutch: the desired pose is where the tip is, nothing is left to chase."""
     s.engaged = 0
     s.leader_kind = 0
+    s.mode = 0
     expected_tip(s, s.desired_position, s.desired_rotation)
+    for i in range(3):
+        s.desired_velocity[i] = 0.0
+        s.desired_angular_velocity[i] = 0.0
+        s.target_position[i] = s.desired_position[i]
+        for j in range(3):
+            s.target_rotation[i, j] = s.desired_rotation[i, j]
 
 
 @compiled
@@ -232,8 +284,39 @@ def _engage_or_check(
 
 
 @compiled
-def _chase(s: RecordFields, tick_input: np.ndarray, rotation: np.ndarray, p: RecordFields) -> None:
+def _keep_inside(
+    outcome: np.ndarray, target: np.ndarray, trocar: np.ndarray, p: RecordFields
+) -> None:
+    """Bring a target (3,) back into the workspace, and under the body wall; note that it was out.
+
+    A target that runs away from where it may be pulls the tip along the border, not beyond it. A
+    tip that is outside already, as after a board or a trocar was changed, may stay where it is.
+    """
+    s = outcome[0].state
+    for i in range(3):
+        low = min(p.workspace_min[i], s.desired_position[i])
+        high = max(p.workspace_max[i], s.desired_position[i])
+        inside = min(max(target[i], low), high)
+        if inside != target[i]:
+            outcome[0].report.target_refused = _OUTSIDE
+            target[i] = inside
+    height, here = 0.0, 0.0
+    for i in range(3):
+        height += (target[i] - trocar[i]) * p.wall_normal[i]
+        here += (s.desired_position[i] - trocar[i]) * p.wall_normal[i]
+    above = height - max(-_UNDER_WALL_M, here)
+    if above > 0.0:
+        outcome[0].report.target_refused = _BEHIND
+        for i in range(3):
+            target[i] -= above * p.wall_normal[i]
+
+
+@compiled
+def _chase(
+    outcome: np.ndarray, tick_input: np.ndarray, rotation: np.ndarray, p: RecordFields
+) -> None:
     """Find the target, lock what is locked, and move the desired pose toward it."""
+    s = outcome[0].state
     leader = tick_input[0].leader
     settings = tick_input[0].settings
     target_position = np.empty(3)
@@ -247,15 +330,8 @@ def _chase(s: RecordFields, tick_input: np.ndarray, rotation: np.ndarray, p: Rec
         target_position[:] = s.anchor_tip_position
     if settings.lock_rotation != 0:
         target_rotation[:] = s.anchor_tip_rotation
-    approach(
-        s,
-        target_position,
-        target_rotation,
-        tick_input[0].dt_s,
-        leader.smoothing_s,
-        p.speed_max,
-        p.angular_speed_max,
-    )
+    _keep_inside(outcome, target_position, tick_input[0].trocar_position, p)
+    approach(s, target_position, target_rotation, tick_input[0].dt_s, leader.smoothing_s, p)
 
 
 @compiled
@@ -288,12 +364,13 @@ def follow(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) 
     matrix_from_quaternion(leader.wxyz, rotation)
     if not _engage_or_check(outcome, leader, settings, p, rotation):
         return False
-    if _settings_changed(s, leader, settings):
+    if _settings_changed(s, leader, settings) or s.mode != leader.mode:
         _anchor(s, leader, settings, rotation)
+    s.mode = leader.mode
     s.leader_sequence = leader.sequence
     for i in range(3):
         s.leader_position[i] = leader.position[i]
         for j in range(3):
             s.leader_rotation[i, j] = rotation[i, j]
-    _chase(s, tick_input, rotation, p)
+    _chase(outcome, tick_input, rotation, p)
     return True

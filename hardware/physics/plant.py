@@ -16,11 +16,16 @@ from hardware.physics.model import SPEED_DAMPING_S, STEP_S, build
 from hardware.physics.preset import PRESETS, draw
 from hardware.physics.tracker import TipTracker
 from hardware.plant import Actuator, Measurement, PlantSpec
+from hardware.wireless import Wireless
 from robot.configuration import Configuration
 from robot.records import ARM_JOINTS, SERVOS
 from robot.rotations import quaternion_from_matrix
+from robot.safety import Event
 from robot.tendons import servo_angles
 from scenes.boards.board import Board
+
+SERVO_STALL_NM = 1.4
+"""Largest torque of an XL430-W250 at 11.1 V, after its maker's data sheet."""
 
 NO_BOARD = Board("none", "No board")
 _EXERCISE_RAD = 0.2
@@ -40,7 +45,7 @@ def _warn(text: str) -> None:
 mujoco.set_mju_user_warning(_warn)
 
 
-class PhysicsPlant:
+class PhysicsPlant(Wireless):
     """Arm, tendon-driven instrument and board in MuJoCo, bitwise repeatable from the seed.
 
     What it measures is what a real robot would: joint encoders, servo positions, tension at the
@@ -76,6 +81,8 @@ class PhysicsPlant:
         self._q_rest, self._rest = np.empty(ARM_JOINTS), np.empty(SERVOS)
         self._trocar_offset = np.zeros(3)
         self._servo, self._tension = np.zeros(SERVOS), np.zeros(SERVOS)
+        self._load = np.zeros(SERVOS)
+        self._load_per_tension = configuration.module.pulley_radius_m / SERVO_STALL_NM
         self._q = np.zeros(ARM_JOINTS)
         self._assemble(NO_BOARD)
         self._constants = self._actuation()
@@ -170,6 +177,7 @@ class PhysicsPlant:
         self._q[:] = self._data.qpos[self._arm]
         self._servo[:] = self._drives["servo"][0]
         self._tension[:] = self._drives["tension"][0]
+        np.multiply(self._tension, self._load_per_tension, out=self._load)
         self._tracker.look(self._time_ns, self._tip, self._tip_rotation)
         self._watch.look(self._data, self._tip)
         self._measurement = Measurement(
@@ -177,8 +185,9 @@ class PhysicsPlant:
             self._servo,
             self._tension,
             self._tracker.newest,
+            self._load,
             contact_n=self._watch.force_n,
-            failed=self._failed,
+            event=int(Event.SIMULATION_FAILED) if self._failed else 0,
         )
 
     def read(self) -> Measurement:
@@ -204,8 +213,8 @@ class PhysicsPlant:
         self._time_ns += self.spec.tick_ns
         if not self._failed:
             self._sense()
-        elif not self._measurement.failed:
-            self._measurement = self._measurement._replace(failed=True)
+        elif not self._measurement.event:
+            self._measurement = self._measurement._replace(event=int(Event.SIMULATION_FAILED))
             self._data.qpos[:] = self._standing
             mujoco.mj_kinematics(self._model, self._data)
         return self.spec.tick_ns

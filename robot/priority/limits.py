@@ -108,6 +108,12 @@ def lock_arm(lower: np.ndarray, upper: np.ndarray) -> None:
 
 
 @compiled
+def lock_segment(lower: np.ndarray, upper: np.ndarray) -> None:
+    """Let the segment keep its bend; the arm alone moves."""
+    lower[7:9], upper[7:9] = 0.0, 0.0
+
+
+@compiled
 def active_limits(
     x: np.ndarray,
     x_dot: np.ndarray,

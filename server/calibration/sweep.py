@@ -91,7 +91,7 @@ def sweep(plant: Plant, configuration: Configuration, progress: Callable[[float]
         plant.write(command)
         plant.advance()
         measurement = plant.read()
-        if measurement.failed or not measurement.valid:
+        if measurement.event or not measurement.valid:
             raise SweepTooPoor("the robot stopped answering during the sweep; start again")
         told[tick] = bend_from_servos(measurement.servo, pitch, pulley)
         sample = measurement.tracker

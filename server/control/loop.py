@@ -77,6 +77,7 @@ class ControlLoop:
         leader: (1,) ``LEADER``: the active leader's newest sample.
         request: a ``Request`` for the next step; consumed by it.
         hold: 1 while the hold-to-move key is down.
+        late_s: how long after its deadline the next step begins.
         trocar: where it is, and how it breathes.
     """
 
@@ -87,6 +88,7 @@ class ControlLoop:
         self.leader = np.zeros(1, LEADER)
         self.request: int = Request.NONE
         self.hold = 0
+        self.late_s = 0.0
         self.trocar = LoopTrocar(configuration)
         self._shaft = ShaftFinder(configuration)
         self._state = robot.initial_state()
@@ -116,6 +118,7 @@ class ControlLoop:
         self._measured_q = self._in["measured_q"]
         self._measured_servo = self._in["measured_servo"]
         self._measured_tension = self._in["measured_tension"]
+        self._measured_load = self._in["measured_load"]
         self._next_state = self._outcome["state"]
         self._desired_position = self._outcome["report"]["desired_position"][0]
         self._desired_wxyz = self._outcome["report"]["desired_wxyz"][0]
@@ -220,9 +223,12 @@ class ControlLoop:
         self._measured_q[:] = measurement.q
         self._measured_servo[:] = measurement.servo
         self._measured_tension[:] = measurement.tension
+        self._measured_load[:] = measurement.load
         tick_input["tracker"] = measurement.tracker
         tick_input["measured_contact"] = measurement.contact_n
-        tick_input["plant_failed"] = measurement.failed
+        tick_input["plant_event"] = measurement.event
+        tick_input["readiness"] = measurement.readiness
+        tick_input["late_s"] = self.late_s
         tick_input["measured_valid"] = measurement.valid
         tick_input["measured_age_s"] = measurement.age_s
         tick_input["dt_s"] = self._dt_ns * 1e-9

@@ -68,7 +68,7 @@ class ControlRunner:
 
     def run(self) -> None:
         """Step until :meth:`stop` is called or the supervisor is gone, then let the plant hold."""
-        period_ns, header = self._period_ns, self._header
+        period_ns, header, loop = self._period_ns, self._header, self._loop
         overruns = 0
         deadline_ns = time.monotonic_ns() + period_ns
         while not self._stopping:
@@ -81,6 +81,7 @@ class ControlRunner:
             if missed > 0:
                 overruns += 0 if self._excused else missed
                 deadline_ns += missed * period_ns
+            loop.late_s = 0.0 if self._excused else lateness_ns * 1e-9
             self._excused = False
             header["lateness_ns"], header["overruns"] = lateness_ns, overruns
             self._tick(now_ns)

@@ -51,6 +51,14 @@ _REFUSED: dict[Refusal, tuple[str, str]] = {
         "turn the leader, or choose relative alignment",
     ),
     Refusal.HOLD_NOT_PRESSED: ("hold-to-move is not pressed", "hold it while moving"),
+    Refusal.OUTSIDE_WORKSPACE: (
+        "the target is outside of the workspace; the tip stays at its border",
+        "move back inside",
+    ),
+    Refusal.BEHIND_TROCAR: (
+        "the target is behind the trocar; the tip stays under the body wall",
+        "aim under the body wall",
+    ),
 }
 
 

@@ -24,6 +24,19 @@ def robot(configuration: Configuration) -> InstrumentRobot:
 
 
 @pytest.fixture(scope="session")
+def free_robot(configuration: Configuration) -> InstrumentRobot:
+    """A robot that may go anywhere: for random postures, and for targets out of reach."""
+    free = {
+        "clearance_mm": -1000.0,
+        "trocar_distance_mm": 1e6,
+        "workspace_min_m": (-9.0, -9.0, -9.0),
+        "workspace_max_m": (9.0, 9.0, 9.0),
+    }
+    limits = configuration.limits.model_copy(update=free)
+    return InstrumentRobot(configuration.model_copy(update={"limits": limits}))
+
+
+@pytest.fixture(scope="session")
 def parameters(robot: InstrumentRobot) -> np.ndarray:
     return robot.parameters
 

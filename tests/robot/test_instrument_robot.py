@@ -80,8 +80,9 @@ def test_a_recorded_session_replays_bit_for_bit(
 
 
 def test_a_tick_changes_neither_state_nor_input_and_remembers_nothing(
-    robot: InstrumentRobot, rng: np.random.Generator
+    free_robot: InstrumentRobot, rng: np.random.Generator
 ) -> None:
+    robot = free_robot
     first, inputs, _ = recorded(robot, rng, 300)
     drive, other = Drive(robot), Drive(robot, random_x(robot, rng))
     other.engage(np.zeros(3))
@@ -101,13 +102,13 @@ def test_a_tick_changes_neither_state_nor_input_and_remembers_nothing(
 @pytest.mark.parametrize("case", list(Case))
 @pytest.mark.parametrize(("solver", "coordinates"), SOLVERS)
 def test_a_lively_session_never_leaves_the_limits(
-    robot: InstrumentRobot,
+    free_robot: InstrumentRobot,
     rng: np.random.Generator,
     case: Case,
     solver: Solver,
     coordinates: Coordinates,
 ) -> None:
-    drive = Drive(robot)
+    robot, drive = free_robot, Drive(free_robot)
     settings = drive.input["settings"]
     settings["case"], settings["solver"], settings["coordinates"] = case, solver, coordinates
     drive.engage(np.zeros(3))
@@ -245,9 +246,9 @@ def test_no_engagement_and_a_resting_trocar_is_no_motion(drive: Drive) -> None:
         assert stood_still(drive.tick(), x)
 
 
-def test_residuals_are_what_the_levels_could_not_do(robot: InstrumentRobot) -> None:
+def test_residuals_are_what_the_levels_could_not_do(free_robot: InstrumentRobot) -> None:
     """Pulled far beyond reach, the twist that is missing is reported and the RCM is not given."""
-    drive = Drive(robot)
+    drive = Drive(free_robot)
     drive.engage(np.zeros(3))
     reach = np.zeros(3)
     for _ in range(2500):

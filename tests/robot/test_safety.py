@@ -43,6 +43,15 @@ EXPECTED: dict[Event, dict[Safety, Safety]] = {
     Event.CONTROL_FAILED: {D: F, E: F, P: F, F: F},
     Event.CONTACT_FORCE: {E: P},
     Event.SIMULATION_FAILED: {D: F, E: F, P: F},
+    Event.BUS_LOST: {E: P, P: P},
+    Event.SERVO_SILENT: {D: F, E: F, P: F},
+    Event.SERVO_FAULT: {D: F, E: F, P: F},
+    Event.ARM_LOST: {E: P, P: P},
+    Event.ARM_FAULT: {D: F, E: F, P: F},
+    Event.DEVICES_BACK: {P: P},
+    Event.CLEARANCE: {E: P},
+    Event.TROCAR_LEFT: {E: F},
+    Event.CONTROL_LATE: {E: P},
 }
 EVERYTHING = list(itertools.product(Safety, Event))
 
@@ -304,7 +313,7 @@ def test_a_simulation_that_broke_down_is_a_fault(
 ) -> None:
     drive = driving(robot)
     drive.state["safety"] = state
-    drive.input["plant_failed"] = 1
+    drive.input["plant_event"] = int(Event.SIMULATION_FAILED)
     x = drive.x
     assert stood_still(drive.tick(), x)
     assert drive.safety == following

@@ -88,7 +88,8 @@ def test_a_simulation_that_breaks_down_ends_the_run_and_says_so(
 
         def read(self) -> Measurement:
             self.ticks += 1
-            return super().read()._replace(failed=self.ticks > 2500)
+            event = int(Event.SIMULATION_FAILED) if self.ticks > 2500 else 0
+            return super().read()._replace(event=event)
 
     monkeypatch.setattr(choose, "PhysicsPlant", Breaking)
     document = play("circle", "1", compensation="off")[1]
