@@ -13,7 +13,7 @@ class ArmReading(NamedTuple):
     Attributes:
         valid: whether the joints were measured, and lately.
         age_s: age of the measured joints, s.
-        event: a ``robot.safety.Event`` that happened since the last reading; 0 without one.
+        event: the ``robot.safety.Event`` that it tells as long as its cause lasts; 0 for none.
         readiness: a ``robot.records.Readiness``; 0 if it may be enabled.
     """
 
@@ -26,8 +26,8 @@ class ArmReading(NamedTuple):
 class ArmDevice(Protocol):
     """An arm of seven joints. Nothing here blocks or waits; angles are in rad.
 
-    A thread of its own may stand behind it. After :meth:`hold` or :meth:`release`, and after
-    anything that went wrong, commands are ignored until :meth:`recover`.
+    A thread of its own may stand behind it. After :meth:`hold` or :meth:`release`, and after an
+    error of its controller, commands are ignored until :meth:`recover`.
     """
 
     def read(self, out_q: np.ndarray) -> ArmReading:
@@ -46,7 +46,7 @@ class ArmDevice(Protocol):
         """Make it ready to be commanded again, from where it stands; it does not move."""
 
     def fill_devices(self, out: np.ndarray) -> None:
-        """Fill the arm's part of the record of devices, for people to see."""
+        """Fill the arm's part of a (1,) ``hardware.devices.DEVICES``, for people to see."""
 
     def close(self) -> None:
         """Stop, and give the device back."""
