@@ -1,0 +1,225 @@
+"""A simulated robot that breaks on request, to show what the console does about it.
+
+Every fault is data: what the wrapped plant says, does or takes is changed in one of few ways,
+always the same way, and from the next tick on. Without a fault nothing is changed or copied.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from hardware.plant import Measurement, Plant, PlantSpec
+from robot.errors import UnknownName
+from robot.records import ARM_JOINTS, COMMAND, SERVOS, Readiness
+from robot.safety import Event
+from scenes.boards.board import Board
+
+_NOBODY = -1
+
+
+class PlantBroke(RuntimeError):
+    """What a plant raises whose code is wrong; a program must survive also what nobody expects."""
+
+
+@dataclass(frozen=True)
+class PlantFault:
+    """One way in which a robot can break.
+
+    Attributes:
+        title: for people.
+        valid: whether measurements still count as valid.
+        silent: measurements get older and stay as they were.
+        event: what the devices tell, as long as the fault lasts.
+        readiness: likewise.
+        contact_n: force that the scene's sensor reads on top of what there is, N.
+        offset_joint: the joint whose measurement is off by ``offset_rad``.
+        offset_rad: by how much, rad; NaN for no number at all.
+        stuck_joint: the joint that stays where it is, whatever it is told.
+        stuck_servo: likewise among the servos.
+        late_s: how much too late the next tick begins, s; once.
+        fails: whether the plant's own code raises.
+        shows_nothing: whether the truth, which is for pictures only, is no number.
+    """
+
+    title: str
+    valid: bool = True
+    silent: bool = False
+    event: Event = Event.NOTHING
+    readiness: Readiness = Readiness.READY
+    contact_n: float = 0.0
+    offset_joint: int = _NOBODY
+    offset_rad: float = 0.0
+    stuck_joint: int = _NOBODY
+    stuck_servo: int = _NOBODY
+    late_s: float = 0.0
+    fails: bool = False
+    shows_nothing: bool = False
+
+
+_OUT = Readiness.NOT_CONNECTED
+_BROKEN = Readiness.DEVICE_FAULT
+
+FAULTS: dict[str, PlantFault] = {
+    "measurement-lost": PlantFault("Measurements are marked as invalid", valid=False),
+    "measurement-silent": PlantFault("Measurements stop coming", silent=True),
+    "measurement-nan": PlantFault(
+        "A joint is measured as no number", offset_joint=3, offset_rad=math.nan
+    ),
+    "joint-stuck": PlantFault("The arm's fourth joint is stuck", stuck_joint=3),
+    "servo-stuck": PlantFault("The first servo is stuck", stuck_servo=0),
+    "encoder-jump": PlantFault(
+        "A joint's encoder jumps by 20 degrees", offset_joint=1, offset_rad=math.radians(20.0)
+    ),
+    "arm-pushed": PlantFault(
+        "Something pushes the arm off the trocar", offset_joint=0, offset_rad=0.06
+    ),
+    "outside-limits": PlantFault(
+        "A joint stands outside its limits",
+        offset_joint=3,
+        offset_rad=math.radians(-400.0),
+        readiness=Readiness.OUTSIDE_LIMITS,
+    ),
+    "contact": PlantFault("The instrument presses on something", contact_n=20.0),
+    "late-tick": PlantFault("A tick comes 150 ms late", late_s=0.15),
+    "plant-exception": PlantFault("The plant's code fails", fails=True),
+    "simulation-broken": PlantFault("The simulation breaks down", event=Event.SIMULATION_FAILED),
+    "bus-lost": PlantFault("The servo bus is gone", event=Event.BUS_LOST, readiness=_OUT),
+    "servo-silent": PlantFault(
+        "A servo does not answer", event=Event.SERVO_SILENT, readiness=_BROKEN
+    ),
+    "servo-overload": PlantFault("A servo is overloaded", event=Event.SERVO_FAULT),
+    "arm-lost": PlantFault("The arm is gone", event=Event.ARM_LOST, readiness=_OUT),
+    "arm-error": PlantFault("The arm reports an error", event=Event.ARM_FAULT, readiness=_BROKEN),
+    "picture-impossible": PlantFault("The picture cannot be drawn", shows_nothing=True),
+}
+"""What can be injected into a simulated robot, by name."""
+
+
+class FaultyPlant:
+    """A plant around another one, which it leaves alone as long as no fault is injected.
+
+    Args:
+        plant: the simulated robot.
+
+    Attributes:
+        spec: of the wrapped plant.
+        active: name of the fault that acts now; empty for none.
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
+        self.spec: PlantSpec = plant.spec
+        self.active = ""
+        self._fault: PlantFault | None = None
+        self._q, self._servo = np.zeros(ARM_JOINTS), np.zeros(SERVOS)
+        self._held_q, self._held_servo = np.zeros(ARM_JOINTS), np.zeros(SERVOS)
+        self._command = np.zeros(1, COMMAND)
+        self._age_s, self._late_s = 0.0, 0.0
+
+    def inject(self, name: str) -> None:
+        """Break it from the next tick on; the fault that acted before is over.
+
+        Raises:
+            UnknownName: there is no such fault.
+        """
+        if name not in FAULTS:
+            raise UnknownName("fault", name, tuple(FAULTS))
+        measured = self._plant.read()
+        self._held_q[:], self._held_servo[:] = measured.q, measured.servo
+        self.active, self._fault = name, FAULTS[name]
+        self._age_s, self._late_s = 0.0, self._fault.late_s
+
+    def clear(self) -> None:
+        """Mend it."""
+        self.active, self._fault = "", None
+
+    def read(self) -> Measurement:
+        """The newest measurement, as the fault leaves it."""
+        measured = self._plant.read()
+        fault = self._fault
+        if fault is None:
+            return measured
+        if fault.fails:
+            raise PlantBroke(f"injected: {fault.title}")
+        self._q[:] = self._held_q if fault.silent else measured.q
+        self._servo[:] = self._held_servo if fault.silent else measured.servo
+        if fault.offset_joint != _NOBODY:
+            self._q[fault.offset_joint] += fault.offset_rad
+        return measured._replace(
+            q=self._q,
+            servo=self._servo,
+            valid=measured.valid and fault.valid,
+            age_s=max(measured.age_s, self._age_s) if fault.silent else measured.age_s,
+            contact_n=measured.contact_n + fault.contact_n,
+            event=int(fault.event) or measured.event,
+            readiness=int(fault.readiness) or measured.readiness,
+        )
+
+    def write(self, command: np.ndarray) -> None:
+        """Pass the command on, except what is stuck."""
+        fault = self._fault
+        if fault is None or (fault.stuck_joint == _NOBODY and fault.stuck_servo == _NOBODY):
+            self._plant.write(command)
+            return
+        self._command[:] = command
+        if fault.stuck_joint != _NOBODY:
+            self._command["q"][0, fault.stuck_joint] = self._held_q[fault.stuck_joint]
+        if fault.stuck_servo != _NOBODY:
+            self._command["servo"][0, fault.stuck_servo] = self._held_servo[fault.stuck_servo]
+        self._plant.write(self._command)
+
+    def advance(self) -> int:
+        """Let one tick pass; a late one takes its time."""
+        if self._fault is not None:
+            late_s, self._late_s = self._late_s, 0.0
+            if late_s > 0.0:
+                time.sleep(late_s)
+            self._age_s += self.spec.tick_ns * 1e-9
+        return self._plant.advance()
+
+    def truth(self, truth: np.ndarray) -> bool:
+        """The wrapped plant's truth, or one that nobody can draw."""
+        known = self._plant.truth(truth)
+        if self._fault is not None and self._fault.shows_nothing:
+            truth["position"], truth["wxyz"] = math.nan, math.nan
+        return known
+
+    def hold(self) -> None:
+        """Stay where it is, under torque."""
+        self._plant.hold()
+
+    def release(self) -> None:
+        """Let go of torque."""
+        self._plant.release()
+
+    def take_hold(self) -> None:
+        """Put torque on."""
+        self._plant.take_hold()
+
+    def home(self) -> None:
+        """Find the tendons' zero."""
+        self._plant.home()
+
+    def reboot(self) -> None:
+        """Start devices anew."""
+        self._plant.reboot()
+
+    def fill_devices(self, devices: np.ndarray) -> None:
+        """What the wrapped plant tells of its devices, (1,) ``hardware.devices.DEVICES``."""
+        self._plant.fill_devices(devices)
+
+    def close(self) -> None:
+        """Give the devices back."""
+        self._plant.close()
+
+    def change_board(self, board: Board) -> None:
+        """Put another board before the instrument."""
+        self._plant.change_board(board)
+
+    def register_trocar(self, position: np.ndarray) -> None:
+        """The trocar is registered now, (3,), base frame, m."""
+        self._plant.register_trocar(position)
