@@ -21,6 +21,7 @@ COMMANDS = {
     "study": "server.commands.study",
     "report": "server.commands.report",
     "bench": "benchmarks.command",
+    "fake-servos": "server.commands.fake_servos",
     "states": "server.commands.states",
 }
 """Subcommands and their modules: ``add_parser(subparsers)`` and ``execute(arguments) -> int``."""
