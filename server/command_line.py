@@ -22,6 +22,7 @@ COMMANDS = {
     "report": "server.commands.report",
     "bench": "benchmarks.command",
     "fake-servos": "server.commands.fake_servos",
+    "stop": "server.commands.stop",
     "states": "server.commands.states",
 }
 """Subcommands and their modules: ``add_parser(subparsers)`` and ``execute(arguments) -> int``."""

@@ -11,11 +11,14 @@ import webbrowser
 from pathlib import Path
 from typing import get_args
 
-from robot.configuration import Compensation, Configuration, Section, Simulation
+from robot.configuration import Compensation, Configuration, Hardware, Section, Simulation
 from robot.errors import UnknownName
 from server.version import version
 
-ROBOTS = ("instrument",)
+ROBOTS = ("instrument", "hardware")
+"""The simulated instrument, and the same one with its real parts connected."""
+
+ARMS = get_args(Hardware.model_fields["arm"].annotation)
 
 _SECTIONS: dict[str, type[Section]] = {"simulation": Simulation, "compensation": Compensation}
 _SIMULATED = {
@@ -37,6 +40,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser("console", help="start the console (also without a command)")
     add_page_arguments(parser)
     parser.add_argument("--robot", default=ROBOTS[0], help=f"one of: {', '.join(ROBOTS)}")
+    parser.add_argument("--servos", metavar="PORT", help="of the servo bus (--robot hardware)")
+    parser.add_argument("--arm", choices=ARMS, help="which arm carries the servos")
+    parser.add_argument("--stylus", metavar="URL", help="of the rosbridge behind a haptic stylus")
     parser.add_argument("--config", metavar="FILE", help="configuration (TOML)")
     for flag, (table, key) in _SIMULATED.items():
         choices = get_args(_SECTIONS[table].model_fields[key].annotation)
@@ -93,6 +99,14 @@ def configured(configuration: Configuration, arguments: argparse.Namespace) -> C
             chosen[table][key] = getattr(arguments, flag)
     if arguments.seed is not None:
         chosen["simulation"]["seed"] = arguments.seed
+    chosen["hardware"] = {"connected": True} if arguments.robot == "hardware" else {}
+    chosen["servos"], chosen["stylus"] = {}, {}
+    if arguments.servos is not None:
+        chosen["servos"]["port"] = arguments.servos
+    if arguments.arm is not None:
+        chosen["hardware"]["arm"] = arguments.arm
+    if arguments.stylus is not None:
+        chosen["stylus"] = {"source": "rosbridge", "url": arguments.stylus}
     if arguments.tracker is not None:
         chosen["tracker"]["enabled"] = arguments.tracker == "on"
     sections = {
@@ -153,13 +167,18 @@ def serve(
     Raises:
         KeyholeError: something stands against the start; nothing was started.
     """
+    from server.audit.folder import folder
+    from server.audit.writer import AuditLog
     from server.memory.run_directory import RunDirectory, default_path
     from server.supervision.listener import address_of, is_loopback, listen
     from server.supervision.supervisor import Supervisor, say
+    from server.supervision.terminal import Terminal
 
     host = configuration.server.host if arguments.host is None else arguments.host
     port = configuration.server.port if arguments.port is None else arguments.port
     directory = RunDirectory.take(arguments.run_directory or default_path())
+    started_ns = time.time_ns()
+    audit = AuditLog("supervisor", folder(), str(started_ns))
     try:
         with listen(host, port) as listener:
             address = address_of(host, listener)
@@ -171,14 +190,17 @@ def serve(
                     "port": listener.getsockname()[1],
                     "address": address,
                     "robot": ROBOTS[0],
-                    "started_ns": time.time_ns(),
+                    "started_ns": started_ns,
                 }
             )
             url = f"{address}?token={directory.new_token()}"
+            terminal = Terminal.of_this_process()
             supervisor = Supervisor(
-                directory, configuration, listener, replay=replay, record=record
-            )
-            _announce(url)
+                directory, configuration, listener,
+                replay=replay, record=record, audit=audit, terminal=terminal,
+            )  # fmt: skip
+            _announce(url, stops=terminal.is_there and replay is None)
+            audit.note("console_started", f"the console was started at {address}", address=address)
             if not is_loopback(listener):
                 say(
                     f"warning: listening on {host}: whoever on the network has the address above "
@@ -186,14 +208,19 @@ def serve(
                 )
             if not arguments.no_browser:
                 _open_browser(url)
-            return supervisor.run()
+            status = supervisor.run()
+            audit.note("console_ended", f"the console ended with status {status}", status=status)
+            return status
     finally:
+        audit.close()
         directory.give_back()
 
 
-def _announce(url: str) -> None:
+def _announce(url: str, stops: bool) -> None:
     print(f"Keyhole {version()}: {url}", flush=True)
     print("Open this address in a browser; it is private to you. Ctrl+C ends the console.")
+    if stops:
+        print("Enter in this terminal is an emergency stop, whatever the page does.")
     sys.stdout.flush()
 
 

@@ -1,7 +1,7 @@
-"""The supervisor: starts control, web and recorder at once, watches them, and ends all in order.
+"""The supervisor: starts control, web, recorder and leader, watches them, and ends all in order.
 
-Web and recorder are started again whenever they end. Control, when it ends unexpectedly, is marked
-as down and then started again; it wakes up DISABLED and nothing but a person enables it.
+Web, recorder and leader are started again whenever they end. Control, when it ends unexpectedly,
+is marked as down and then started again; it wakes up DISABLED and nothing but a person enables it.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from numpy.typing import NDArray
 
 from robot.configuration import Configuration
 from robot.records import RECORD
+from server.audit.wall_clock import WallClock
+from server.audit.writer import AuditLog
 from server.memory.link_records import (
     RECORD_SLOT_FILE,
     STATUS,
@@ -37,13 +39,17 @@ from server.memory.recording_link import RecordingLink
 from server.memory.replay_link import create_replay_files
 from server.memory.run_directory import RunDirectory
 from server.supervision.child_process import ChildProcess, describe_exit
+from server.supervision.stop_order import StopOrder
+from server.supervision.terminal import Terminal
 
 _WATCH_S = 0.25
 _CONTROL_PAUSE_S = 1.0
 _WEB_PAUSE_S = 0.25
 _RECORDER_PAUSE_S = 0.25
+_LEADER_PAUSE_S = 0.25
 _PATIENCE_S = 5.0
 _SILENCE_S = 5.0
+_STOP_S = 1.0
 _CANNOT_START = 2
 
 
@@ -62,6 +68,8 @@ class Supervisor:
         replay: a recording that is shown in place of a robot; there is then neither control nor
             recorder.
         record: a file to record into from the start.
+        audit: where starts, ends and stops are noted.
+        terminal: Enter in it is an emergency stop.
     """
 
     def __init__(
@@ -72,7 +80,12 @@ class Supervisor:
         *,
         replay: Path | None = None,
         record: Path | None = None,
+        audit: AuditLog | None = None,
+        terminal: Terminal | None = None,
     ) -> None:
+        self._audit = audit or AuditLog("supervisor", None)
+        self._terminal = terminal or Terminal(None)
+        self._wall_clock = WallClock()
         control = configuration.control
         create_mapped_files(directory.path, control.rate_hz, control.record_ring_seconds)
         self._supervision = MappedSlot(
@@ -80,10 +93,12 @@ class Supervisor:
         )
         self._status = MappedSlot(directory.path / STATUS_FILE, STATUS)
         self._record = MappedSlot(directory.path / RECORD_SLOT_FILE, RECORD)
+        self._stop_order = StopOrder(self._record)
         # The writing end is inherited by nobody, so it closes with this process.
         lifeline, self._lifeline_end = os.pipe()
         common = ["--run-directory", str(directory.path), "--lifeline-fd", str(lifeline)]
         self._recorder: ChildProcess | None = None
+        self._leader: ChildProcess | None = None
         if replay is None:
             self._control = ChildProcess(
                 "control", "server.control.process", common, [lifeline], _CONTROL_PAUSE_S
@@ -95,6 +110,10 @@ class Supervisor:
                 [lifeline],
                 _RECORDER_PAUSE_S,
             )
+            if configuration.stylus.source != "off":
+                self._leader = ChildProcess(
+                    "leader", "server.leaders.process", common, [lifeline], _LEADER_PAUSE_S
+                )
             self._ask_for(directory.path, record)
         else:
             create_replay_files(directory.path)
@@ -132,19 +151,38 @@ class Supervisor:
         """
         wake = self._catch_signals()
         try:
-            self._web.start()
-            self._control.start()
-            if self._recorder is not None:
-                self._recorder.start()
+            for child in (self._web, self._control, self._recorder, self._leader):
+                if child is not None:
+                    child.start()
+                    self._note_start(child)
             self._mark(ControlState.STARTING)
             while not self._ending:
                 self._wait(wake)
                 self._watch_control()
                 self._watch_web()
-                self._watch_recorder()
+                self._watch_beside(self._recorder, "the recorder")
+                self._watch_beside(self._leader, "the stylus' process")
+                self._watch_wall_clock()
         finally:
             self._end()
         return self._exit_status
+
+    def _note_start(self, child: ChildProcess) -> None:
+        again = f" again ({child.restarts})" if child.restarts else ""
+        self._audit.note(
+            "process_started", f"{child.title} was started{again}",
+            process=child.title, child=child.pid, restarts=child.restarts,
+        )  # fmt: skip
+
+    def _note_end(self, child: ChildProcess, cause: str) -> None:
+        words = f"{child.title} ended unexpectedly ({cause})"
+        self._audit.note("process_ended", words, process=child.title, cause=cause)
+
+    def _watch_wall_clock(self) -> None:
+        jump_s = self._wall_clock.jump_s()
+        if jump_s is not None:
+            words = f"the wall clock moved by {jump_s:+.3f} s; nothing depends on it"
+            self._audit.note("clock_jumped", words, jump_s=round(jump_s, 6))
 
     def _catch_signals(self) -> socket.socket:
         reading, writing = socket.socketpair()
@@ -162,11 +200,27 @@ class Supervisor:
     def _on_end(self, _number: int, _frame: FrameType | None) -> None:
         self._ending = True
 
-    @staticmethod
-    def _wait(wake: socket.socket) -> None:
-        select.select([wake], [], [], _WATCH_S)
+    def _wait(self, wake: socket.socket) -> None:
+        typed = self._terminal.descriptors()
+        ready, _, _ = select.select([wake.fileno(), *typed], [], [], _WATCH_S)
+        if any(one in ready for one in typed) and self._terminal.pressed():
+            self._stop_from_terminal()
         with contextlib.suppress(BlockingIOError):
             wake.recv(4096)
+
+    def _stop_from_terminal(self) -> None:
+        if self._recorder is None:
+            say("this is a replay: nothing moves")
+            return
+        sent = self._stop_order.send(self._control.pid)
+        took_ms = self._stop_order.wait(_STOP_S) if sent else None
+        if took_ms is None:
+            words = "emergency stop from the terminal: control does not confirm it"
+            say(f"{words}; use the stop on the machine")
+        else:
+            words = f"emergency stop from the terminal: the robot holds after {took_ms:.1f} ms"
+            say(words)
+        self._audit.note("emergency_stop", words, by="terminal", took_ms=took_ms)
 
     def _watch_control(self) -> None:
         status = self._control.ended()
@@ -174,6 +228,7 @@ class Supervisor:
             self._control_ended(status)
         elif self._control.restart_if_due():
             self._phase = Phase.STARTING
+            self._note_start(self._control)
             self._mark(ControlState.STARTING)
         elif self._control.pid:
             self._watch_phase()
@@ -191,6 +246,7 @@ class Supervisor:
             cause = said["message"][0].decode(errors="replace")
         self._message = f"control ended unexpectedly ({cause}); it starts again, disabled"
         say(self._message)
+        self._note_end(self._control, cause)
         self._mark(ControlState.DOWN)
 
     def _watch_phase(self) -> None:
@@ -216,7 +272,9 @@ class Supervisor:
         if ticks != self._ticks:
             self._ticks, self._ticked = ticks, now
         elif now - self._ticked > _SILENCE_S:
-            say(f"control has not ticked for {_SILENCE_S:g} s and is ended by force")
+            words = f"control has not ticked for {_SILENCE_S:g} s and is ended by force"
+            say(words)
+            self._audit.note("process_hung", words, process="control")
             self._ticked = now
             self._control.kill()
 
@@ -232,18 +290,22 @@ class Supervisor:
         status = self._web.ended()
         if status is not None and not self._ending:
             say(f"web ended unexpectedly ({describe_exit(status)}); it starts again")
+            self._note_end(self._web, describe_exit(status))
             self._mark_again()
         elif self._web.restart_if_due():
+            self._note_start(self._web)
             self._mark_again()
 
-    def _watch_recorder(self) -> None:
-        if self._recorder is None:
+    def _watch_beside(self, process: ChildProcess | None, name: str) -> None:
+        """Start again what nobody else waits for."""
+        if process is None:
             return
-        status = self._recorder.ended()
+        status = process.ended()
         if status is not None and not self._ending:
-            say(f"the recorder ended unexpectedly ({describe_exit(status)}); it starts again")
-        else:
-            self._recorder.restart_if_due()
+            say(f"{name} ended unexpectedly ({describe_exit(status)}); it starts again")
+            self._note_end(process, describe_exit(status))
+        elif process.restart_if_due():
+            self._note_start(process)
 
     def _mark_again(self) -> None:
         self._mark(self._control_state)
@@ -264,8 +326,12 @@ class Supervisor:
         """End control first, so that the robot holds, then the recorder, then web."""
         if not self._control.finish(_PATIENCE_S):
             say(f"control did not end within {_PATIENCE_S:g} s and was ended by force")
-        if self._recorder is not None and not self._recorder.finish(_PATIENCE_S):
-            say(f"the recorder did not end within {_PATIENCE_S:g} s and was ended by force")
+        for process, name in (
+            (self._leader, "the stylus' process"),
+            (self._recorder, "the recorder"),
+        ):
+            if process is not None and not process.finish(_PATIENCE_S):
+                say(f"{name} did not end within {_PATIENCE_S:g} s and was ended by force")
         if not self._web.finish(_PATIENCE_S):
             say(f"web did not end within {_PATIENCE_S:g} s and was ended by force")
         os.close(self._lifeline_end)
