@@ -4,21 +4,69 @@ from __future__ import annotations
 
 import numpy as np
 
+from hardware.arm.device import ArmDevice
+from hardware.faulty_plant import FaultyPlant
 from hardware.kinematic_plant import KinematicPlant
 from hardware.physics.plant import PhysicsPlant
 from hardware.plant import Plant
 from robot.configuration import Configuration
+from robot.records import ARM_JOINTS
 from scenes.boards.board import board
 
 
 def make_plant(configuration: Configuration, x: np.ndarray) -> Plant:
-    """The plant that ``configuration.simulation`` names, standing at ``x``.
+    """The plant that the configuration names, standing at ``x`` if it is simulated.
 
     Args:
-        configuration: describes robot and simulation.
+        configuration: describes robot, simulation and hardware.
         x: (10,) the controller's configuration at the start.
+
+    Raises:
+        KeyholeError: a real part cannot be used as it is configured.
     """
+    if configuration.hardware.connected:
+        return _real(configuration, x)
+    return simulated_plant(configuration, x)
+
+
+def simulated_plant(configuration: Configuration, x: np.ndarray) -> Plant:
+    """The simulated robot that ``configuration.simulation`` names, standing at ``x`` (10,)."""
     simulation = configuration.simulation
     if simulation.plant == "kinematic":
         return KinematicPlant(configuration, x)
     return PhysicsPlant(configuration, x, board(simulation.board, configuration))
+
+
+def breakable_plant(configuration: Configuration, x: np.ndarray) -> Plant:
+    """As :func:`make_plant`; a simulated robot may then be broken on request."""
+    plant = make_plant(configuration, x)
+    return FaultyPlant(plant) if plant.spec.simulated else plant
+
+
+def _real(configuration: Configuration, x: np.ndarray) -> Plant:
+    from hardware.hybrid_plant import HybridPlant
+    from hardware.module.module import InstrumentModule
+
+    arm = _arm(configuration, x[:ARM_JOINTS])
+    try:
+        return HybridPlant(configuration, arm, InstrumentModule(configuration))
+    except BaseException:
+        arm.close()
+        raise
+
+
+def _arm(configuration: Configuration, q: np.ndarray) -> ArmDevice:
+    wanted = configuration.hardware.arm
+    if wanted == "xarm":
+        from hardware.arm.xarm import XArm
+
+        return XArm(configuration)
+    if wanted == "locked":
+        from hardware.arm.locked import LockedArm
+
+        return LockedArm(q)
+    from hardware.arm.simulated import SimulatedArm
+    from hardware.physics.preset import PRESETS
+
+    speeds = np.array([joint.speed_rad_s for joint in configuration.arm.joints])
+    return SimulatedArm(q, PRESETS[configuration.simulation.preset], speeds)

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from robot.compiled import compiled
+from robot.tendons import bend_from_servos
 
 JOINT_POSITION_BIT = 0
 JOINT_SPEED_BIT = 7
@@ -27,6 +28,8 @@ a fast tick."""
 LAMBDA_SPEED = 2.0
 """Largest rate of lambda, 1/s: with a 230 mm shaft, an insertion of 460 mm/s."""
 _TOUCH = 1e-9
+_STAND_ASIDE, _BENT_ASIDE = math.radians(2.0), math.radians(5.0)
+"""How far outside of joint and bend limits a robot may stand and still be enabled, rad."""
 
 
 @compiled
@@ -98,6 +101,20 @@ def rate_limits(
         # All of it is taken back, but no faster than the servos can.
         return float(max(room / dt, -ratio * p.servo_speed))
     return float(gain * room / dt)
+
+
+@compiled
+def stands_inside(q: np.ndarray, servo: np.ndarray, parameters: np.ndarray) -> bool:
+    """Whether measured joints (7,) and servos (4,), rad, stand where a motion may begin.
+
+    A little outside is taken back by :func:`rate_limits`; further out, somebody else has to.
+    """
+    p = parameters[0]
+    for k in range(7):
+        if q[k] < p.joint_lower[k] - _STAND_ASIDE or q[k] > p.joint_upper[k] + _STAND_ASIDE:
+            return False
+    u, v = bend_from_servos(servo, p.pitch_radius, p.pulley_radius)
+    return bool(math.hypot(u, v) <= p.bend_max + _BENT_ASIDE)
 
 
 @compiled

@@ -35,7 +35,7 @@ def belonging(configuration: Configuration) -> str:
     """A mark of all that a calibration made with ``configuration`` depends on, hexadecimal."""
     parts = [getattr(configuration, name).model_dump_json() for name in _BELONGING]
     digest = hashlib.sha256("\n".join([robot_name(configuration), *parts]).encode())
-    if configuration.simulation.plant == "physics":
+    if configuration.simulation.plant == "physics" and not configuration.hardware.connected:
         # A simulated robot is what its code makes it.
         for source in sorted(Path(hardware.physics.__file__).parent.glob("*.py")):
             digest.update(source.read_bytes())

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hardware.choose import make_plant
+from hardware.choose import simulated_plant
 from hardware.plant import Plant
 from robot.arm import Arm
 from robot.calibration import Calibration
@@ -120,7 +120,7 @@ def calibrate(
     free = configuration.simulation.model_copy(update={"board": "none"})
     configuration = configuration.model_copy(update={"simulation": free})
     x = InstrumentRobot(configuration).initial_state()["x"][0]
-    plant = make_plant(configuration, x)
+    plant = simulated_plant(configuration, x)
     try:
         found = sweep(plant, configuration, progress)
     finally:
@@ -162,7 +162,9 @@ def calibration_for(
 
 
 def robot_name(configuration: Configuration) -> str:
-    """Which robot ``configuration.simulation`` names, in words."""
+    """Which robot the configuration names, in words."""
+    if configuration.hardware.connected:
+        return "hardware, servos " + " ".join(str(number) for number in configuration.servos.ids)
     simulation = configuration.simulation
     if simulation.plant == "kinematic":
         return "kinematic"

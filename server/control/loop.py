@@ -9,11 +9,13 @@ import time
 
 import numpy as np
 
+from hardware.faulty_plant import FAULTS, FaultyPlant
 from hardware.plant import Plant
 from robot.configuration import Configuration
 from robot.forward import ForwardKinematics, measure_errors
 from robot.instrument_robot import InstrumentRobot
 from robot.priority.levels import case_named
+from robot.priority.limits import stands_inside
 from robot.records import (
     LEADER,
     RECORD,
@@ -24,6 +26,7 @@ from robot.records import (
     Coordinates,
     ErrorSource,
     LeaderKind,
+    Readiness,
     Request,
     Safety,
     Solver,
@@ -171,6 +174,17 @@ class ControlLoop:
         """The path that is playing."""
         return self._path
 
+    def inject(self, fault: str) -> None:
+        """Put a fault into a simulated plant, or clear all of them with ""; see
+        ``hardware.faulty_plant``. A real robot is left alone.
+        """
+        if not isinstance(self.plant, FaultyPlant):
+            return
+        if fault in FAULTS:
+            self.plant.inject(fault)
+        else:
+            self.plant.clear()
+
     def start_path(self, path: Path, path_id: int = 0, lock_arm: bool = False) -> None:
         """Play ``path`` from where the commanded tip is now; it excludes every other leader.
 
@@ -228,6 +242,10 @@ class ControlLoop:
         tick_input["measured_contact"] = measurement.contact_n
         tick_input["plant_event"] = measurement.event
         tick_input["readiness"] = measurement.readiness
+        if measurement.readiness == Readiness.READY and self._state["safety"][0] != Safety.ENABLED:
+            parameters = self.robot.parameters
+            if not stands_inside(measurement.q, measurement.servo, parameters):
+                tick_input["readiness"] = Readiness.OUTSIDE_LIMITS
         tick_input["late_s"] = self.late_s
         tick_input["measured_valid"] = measurement.valid
         tick_input["measured_age_s"] = measurement.age_s

@@ -92,7 +92,7 @@ def _run(directory: RunDirectory, configuration: Configuration, lifeline: Lifeli
     link = ControlLink(directory.path)
     status = Status(link, configuration.control.rate_hz)
     status.say(Phase.STARTING, "loading the controller")
-    from hardware.choose import make_plant
+    from hardware.choose import breakable_plant
     from robot.instrument_robot import InstrumentRobot
     from server.control import realtime
     from server.control.loop import ControlLoop
@@ -108,7 +108,7 @@ def _run(directory: RunDirectory, configuration: Configuration, lifeline: Lifeli
         directory.write_calibration(calibration)
     robot = InstrumentRobot(configuration, calibration)
     start = robot.initial_state()["x"][0]
-    plant = make_plant(configuration, start)
+    plant = breakable_plant(configuration, start)
     try:
         loop = ControlLoop(robot, plant, configuration)
         runner = ControlRunner(
@@ -116,6 +116,7 @@ def _run(directory: RunDirectory, configuration: Configuration, lifeline: Lifeli
         )
         status.show(loop.trocar, runner.board)
         signal.signal(signal.SIGTERM, lambda *_: runner.stop())
+        signal.signal(signal.SIGUSR1, lambda *_: runner.emergency_stop())
         words = realtime.enter(configuration.control.realtime)
         status.say(Phase.RUNNING, "running", realtime=words, plant=plant.spec.name)
         return drive(runner, status)
@@ -132,6 +133,9 @@ def _calibration(configuration: Configuration, status: Status) -> Calibration:
     kept = load_if_there(path)
     if kept is not None:
         return kept
+    if configuration.hardware.connected:
+        # The bend of a real robot is measured by nothing here: it has to be given as a file.
+        return Calibration()
     status.say(Phase.STARTING, "calibrating the tendons (a few seconds, once)")
     # Made whatever the mode is now: it may be chosen later.
     full = configuration.compensation.model_copy(update={"mode": "full"})
@@ -172,8 +176,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--run-directory", required=True, type=Path)
     parser.add_argument("--lifeline-fd", type=int)
     arguments = parser.parse_args(argv)
-    for ignored in (signal.SIGINT, signal.SIGHUP):
-        # The supervisor gets them too, and ends everything in order.
+    for ignored in (signal.SIGINT, signal.SIGHUP, signal.SIGUSR1):
+        # The supervisor gets the first two, and ends everything in order; the last one stops
+        # motion, of which there is none yet.
         signal.signal(ignored, signal.SIG_IGN)
     try:
         directory = RunDirectory(arguments.run_directory)

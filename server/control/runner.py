@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hardware.devices import DEVICES
 from robot.configuration import Configuration
 from robot.records import Request, Safety
 from robot.safety import Event, apply_event
@@ -17,6 +18,7 @@ from server.control.lifeline import Lifeline
 from server.control.loop import ControlLoop
 from server.control.mapped_path import MappedPath
 from server.memory.control_link import ControlLink, PathStart
+from server.memory.link_records import HOME, REBOOT_DEVICES, RELEASE_TORQUE, TAKE_HOLD
 
 _LIFELINE_EVERY_TICKS = 50
 _COLLECT_EVERY_NS = 10_000_000_000
@@ -54,17 +56,22 @@ class ControlRunner:
         self._configuration, self._changed = configuration, changed
         self.board: str = configuration.simulation.board
         self._period_ns = round(1e9 / configuration.control.rate_hz)
-        self._excused = False
+        self._excused = self._emergency = False
         # The link writes the active leader's sample right where the loop reads it.
         loop.leader = link.leader
         self._header = loop.record["header"][0]
         self._stopping = False
         self._until_lifeline = _LIFELINE_EVERY_TICKS
         self._collected_ns = 0
+        self._devices = np.zeros(1, DEVICES)
 
     def stop(self) -> None:
         """Ask the loop to end after the tick it is in; may be called from a signal handler."""
         self._stopping = True
+
+    def emergency_stop(self) -> None:
+        """Stop all motion with the next tick; called from a signal handler, when all else hangs."""
+        self._emergency = True
 
     def run(self) -> None:
         """Step until :meth:`stop` is called or the supervisor is gone, then let the plant hold."""
@@ -102,9 +109,12 @@ class ControlRunner:
         """Hand over what this tick's poll found."""
         link, loop = self._link, self._loop
         loop.request, loop.hold = link.request, link.hold
+        if self._emergency:
+            self._emergency = False
+            loop.request = Request.EMERGENCY_STOP
         if link.settings_changed:
             loop.settings[:] = link.settings
-        released = link.request not in _KEEPS_LEADING
+        released = loop.request not in _KEEPS_LEADING
         if released:
             link.release_leaders()
         if released or link.path_stop:
@@ -119,6 +129,26 @@ class ControlRunner:
             self._changed()
         if link.board is not None and loop.safety == Safety.DISABLED:
             self._change_board(BOARD_NAMES[link.board])
+        if link.device_request:
+            self._ask_devices(link.device_request)
+        if link.fault is not None:
+            self._loop.inject(link.fault)
+
+    def _ask_devices(self, kind: int) -> None:
+        """What the devices are asked for is theirs to do, beside the loop; nothing here waits."""
+        loop, plant = self._loop, self._loop.plant
+        if kind == RELEASE_TORQUE:
+            if loop.safety in (Safety.ENABLED, Safety.PAUSED):
+                loop.request = Request.DISABLE
+            plant.release()
+        elif kind == HOME and loop.safety == Safety.DISABLED:
+            plant.home()
+        elif loop.safety == Safety.ENABLED:
+            return
+        elif kind == TAKE_HOLD:
+            plant.take_hold()
+        elif kind == REBOOT_DEVICES:
+            plant.reboot()
 
     def _start_path(self, wanted: PathStart) -> None:
         """Play a path; whoever asked sees by the record's ``path_id`` that it plays."""
@@ -141,6 +171,8 @@ class ControlRunner:
         if self._until_lifeline > 0:
             return
         self._until_lifeline = _LIFELINE_EVERY_TICKS
+        self._loop.plant.fill_devices(self._devices)
+        self._link.write_devices(self._devices)
         if self._lifeline.is_cut():
             self._stopping = True
         now_ns = time.monotonic_ns()

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hardware.devices import DEVICES
 from robot.records import LEADER, RECORD, SETTINGS, Request
 from scenes.trocar_motion import Breathing
 from server.control.leader_choice import NOBODY, LeaderChoice
@@ -16,16 +17,21 @@ from server.memory.link_records import (
     ALIVE_FILE,
     BOARD_CHANGE,
     BREATHING_CHANGE,
+    DEVICES_FILE,
     EMERGENCY,
     EMERGENCY_FILE,
     HOLD_FILE,
     HOLD_SLOT,
+    HOME,
+    INJECT_FAULT,
     LEADER_KINDS,
     LEADER_SLOT,
     PATH_START,
     PATH_STOP,
+    REBOOT_DEVICES,
     RECORD_RING_FILE,
     RECORD_SLOT_FILE,
+    RELEASE_TORQUE,
     REQUEST_FILE,
     REQUEST_MESSAGE,
     SETTINGS_CHANGE,
@@ -33,6 +39,7 @@ from server.memory.link_records import (
     STATUS_FILE,
     SUPERVISION,
     SUPERVISION_FILE,
+    TAKE_HOLD,
     TROCAR_CHANGE,
     TrocarSource,
     leader_file,
@@ -50,6 +57,7 @@ LEADER_GONE_NS = 1_000_000_000
 """A leader silent for longer (and for ten of its own time-outs) no longer keeps others out."""
 
 _REQUESTS = frozenset(int(request) for request in Request)
+_DEVICE_REQUESTS = frozenset((HOME, RELEASE_TORQUE, TAKE_HOLD, REBOOT_DEVICES))
 
 
 class PathStart(NamedTuple):
@@ -89,6 +97,9 @@ class ControlLink:
         trocar_change: a trocar to register in this tick, or None.
         breathing: how the trocar shall breathe from now on, or None for no change.
         board: the board to put before the instrument, its place among the boards' names, or None.
+        device_request: what the devices are asked for in this tick (HOME, RELEASE_TORQUE, TAKE_HOLD
+            or REBOOT_DEVICES), or 0.
+        fault: name of a fault to inject in this tick, "" to clear them, or None.
         hold: 1 while hold-to-move is pressed and freshly so, else 0.
         leader: (1,) LEADER, the active leader's newest sample with ``age_s`` set.
 
@@ -105,6 +116,7 @@ class ControlLink:
         self._record = slot(RECORD_SLOT_FILE, RECORD, writable=True)
         self._ring = MappedRing(self._directory / RECORD_RING_FILE, RECORD, writable=True)
         self._status = slot(STATUS_FILE, STATUS, writable=True)
+        self._devices = slot(DEVICES_FILE, DEVICES, writable=True)
         self._requests = MappedRing(self._directory / REQUEST_FILE, REQUEST_MESSAGE)
         self._emergency = slot(EMERGENCY_FILE, EMERGENCY)
         self._supervision = _Inbox(slot(SUPERVISION_FILE, SUPERVISION))
@@ -126,6 +138,8 @@ class ControlLink:
         self.trocar_change: TrocarChange | None = None
         self.breathing: Breathing | None = None
         self.board: int | None = None
+        self.device_request = 0
+        self.fault: str | None = None
         self.hold = 0
         self.leader = np.zeros(1, dtype=LEADER)
         self.leader["wxyz"][0, 0] = 1.0
@@ -136,7 +150,8 @@ class ControlLink:
         """Read what is new and set the attributes for the tick that follows."""
         self.request = int(Request.NONE)
         self.settings_changed = self.path_stop = False
-        self.path_start = self.trocar_change = self.breathing = self.board = None
+        self.path_start = self.trocar_change = self.breathing = self.board = self.fault = None
+        self.device_request = 0
         if self._emergency.sequence != self._emergencies:
             self._emergencies = self._emergency.sequence
             self._drop_requests()
@@ -175,6 +190,10 @@ class ControlLink:
                 self.path_stop = True
             elif kind in (TROCAR_CHANGE, BREATHING_CHANGE, BOARD_CHANGE):
                 self._take_change(kind, message)
+            elif kind in _DEVICE_REQUESTS:
+                self.device_request = kind
+            elif kind == INJECT_FAULT:
+                self.fault = message["fault"].decode()
             elif kind in _REQUESTS:
                 self.request = kind
             return
@@ -239,6 +258,10 @@ class ControlLink:
         """
         self._ring.push(record)
         self._record.write(record)
+
+    def write_devices(self, devices: NDArray[Any]) -> None:
+        """Publish the (1,) DEVICES; a few times a second."""
+        self._devices.write(devices)
 
     def write_status(self, status: NDArray[Any]) -> None:
         """Publish the (1,) STATUS; for what changes rarely."""

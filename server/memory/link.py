@@ -18,25 +18,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hardware.devices import DEVICES
 from robot.errors import InvalidPose
-from robot.records import RECORD, LeaderKind, Request
+from robot.records import RECORD, DriveMode, LeaderKind, Request
 from scenes.trocar_motion import Breathing
+from server.memory.leader_slot import SMALLEST_QUATERNION, LeaderSlot
 from server.memory.link_records import (
     ALIVE,
     ALIVE_FILE,
     BOARD_CHANGE,
     BREATHING_CHANGE,
+    DEVICES_FILE,
     EMERGENCY,
     EMERGENCY_FILE,
     HOLD_FILE,
     HOLD_SLOT,
-    LEADER_KINDS,
-    LEADER_SLOT,
+    HOME,
+    INJECT_FAULT,
     PATH_COLUMNS,
     PATH_START,
     PATH_STOP,
+    REBOOT_DEVICES,
     RECORD_RING_FILE,
     RECORD_SLOT_FILE,
+    RELEASE_TORQUE,
     REQUEST_FILE,
     REQUEST_MESSAGE,
     SETTINGS_CHANGE,
@@ -44,17 +49,17 @@ from server.memory.link_records import (
     STATUS_FILE,
     SUPERVISION,
     SUPERVISION_FILE,
+    TAKE_HOLD,
     TROCAR_CHANGE,
+    WEB_LEADER_KINDS,
     ControlState,
     Phase,
     TrocarSource,
-    leader_file,
     path_file,
 )
 from server.memory.mapped import MappedReadError, MappedRing, MappedSlot
 
 _PATHS_FILE = "paths.json"
-_SMALLEST_QUATERNION = 1e-6
 
 
 class WebLink:
@@ -79,26 +84,14 @@ class WebLink:
         self._record = MappedSlot(self._directory / RECORD_SLOT_FILE, RECORD)
         self._status = MappedSlot(self._directory / STATUS_FILE, STATUS)
         self._supervision = MappedSlot(self._directory / SUPERVISION_FILE, SUPERVISION)
+        self._devices = MappedSlot(self._directory / DEVICES_FILE, DEVICES)
         self._requests = MappedRing(self._directory / REQUEST_FILE, REQUEST_MESSAGE, writable=True)
         self._emergency = MappedSlot(self._directory / EMERGENCY_FILE, EMERGENCY, writable=True)
         self._hold = MappedSlot(self._directory / HOLD_FILE, HOLD_SLOT, writable=True)
         self._alive = MappedSlot(self._directory / ALIVE_FILE, ALIVE, writable=True)
-        self._leaders = {
-            kind: MappedSlot(self._directory / leader_file(kind), LEADER_SLOT, writable=True)
-            for kind in LEADER_KINDS
-        }
+        self._leaders = {kind: LeaderSlot(self._directory, kind) for kind in WEB_LEADER_KINDS}
         self._paths = self._known_paths()
-        for slot in self._leaders.values():
-            self._open_clutch(slot)
         self.hold(False)
-
-    @staticmethod
-    def _open_clutch(slot: MappedSlot) -> None:
-        with contextlib.suppress(MappedReadError):
-            sample = slot.read()
-            sample["leader"]["clutch"] = 0
-            sample["stamp_ns"] = time.monotonic_ns()
-            slot.write(sample)
 
     def request(self, kind: int) -> int:
         """Send a :class:`robot.records.Request`; returns the number to wait for.
@@ -167,6 +160,30 @@ class WebLink:
         """
         return self._send(BOARD_CHANGE, board=board)
 
+    def home(self) -> int:
+        """Ask the instrument module to find its zero; only taken while the robot is DISABLED."""
+        return self._send(HOME)
+
+    def release_torque(self) -> int:
+        """Ask every device to let go; a robot that is enabled or paused is disabled by it."""
+        return self._send(RELEASE_TORQUE)
+
+    def take_hold(self) -> int:
+        """Ask every device to put torque on where it stands; not taken while ENABLED."""
+        return self._send(TAKE_HOLD)
+
+    def reboot_devices(self) -> int:
+        """Ask devices that took themselves out of service to start anew; not while ENABLED."""
+        return self._send(REBOOT_DEVICES)
+
+    def inject_fault(self, name: str) -> int:
+        """Put a fault of ``hardware.faulty_plant.FAULTS`` into a simulated robot; "" clears all."""
+        return self._send(INJECT_FAULT, fault=name.encode())
+
+    def devices(self) -> NDArray[Any]:
+        """What is known of the devices, (1,) ``hardware.devices.DEVICES``; at first zeros."""
+        return self._read_or_zero(self._devices, DEVICES)
+
     def emergency_stop(self) -> int:
         """Stop all motion: control acts on it in the tick in which it sees it.
 
@@ -193,11 +210,12 @@ class WebLink:
         absolute: bool,
         smoothing_s: float,
         timeout_s: float,
+        mode: DriveMode = DriveMode.BOTH,
     ) -> None:
         """Publish a leader's newest sample; the one before is forgotten.
 
         Args:
-            kind: GIZMO, API_POSE or API_TARGET.
+            kind: one of ``LEADER_KINDS``.
             sequence: grows with each new sample.
             clutch: whether the leader is engaged.
             position: (3,) in m.
@@ -206,25 +224,21 @@ class WebLink:
                 clutch's anchor.
             smoothing_s: time constant over which coarse samples are interpolated; 0 for none.
             timeout_s: older than this, a sample with a closed clutch is stale.
+            mode: what the leader drives.
 
         Raises:
             InvalidPose: NaN, infinity, or a quaternion that is nearly zero; nothing is published.
         """
-        sample = np.zeros(1, dtype=LEADER_SLOT)
-        leader = sample["leader"]
-        leader["kind"], leader["sequence"] = int(kind), sequence
-        leader["clutch"], leader["absolute"] = int(clutch), int(absolute)
-        leader["timeout_s"], leader["smoothing_s"] = timeout_s, smoothing_s
-        leader["position"], leader["wxyz"] = position, wxyz
-        if not (np.isfinite(leader["position"]).all() and np.isfinite(leader["wxyz"]).all()):
-            raise InvalidPose(f"leader {kind.name}", "the pose holds NaN or infinity")
-        norm = float(np.linalg.norm(leader["wxyz"]))
-        if norm < _SMALLEST_QUATERNION:
-            raise InvalidPose(f"leader {kind.name}", "the quaternion is zero")
-        leader["wxyz"] /= norm
-        with self._lock:
-            sample["stamp_ns"] = time.monotonic_ns()
-            self._leaders[kind].write(sample)
+        self._leaders[kind].write(
+            sequence=sequence,
+            clutch=clutch,
+            position=position,
+            wxyz=wxyz,
+            absolute=absolute,
+            smoothing_s=smoothing_s,
+            timeout_s=timeout_s,
+            mode=mode,
+        )
 
     def hold(self, down: bool) -> None:
         """Say whether hold-to-move is pressed; repeat a press at least every 0.3 s."""
@@ -330,8 +344,9 @@ class WebLink:
 
     def close(self) -> None:
         """Unmap every file."""
-        slots = [self._record, self._status, self._supervision, self._emergency, self._hold]
-        for slot in [*slots, self._alive, *self._leaders.values()]:
+        said = (self._record, self._status, self._supervision, self._devices)
+        wanted = (self._emergency, self._hold, self._alive)
+        for slot in (*said, *wanted, *self._leaders.values()):
             slot.close()
         self._requests.close()
 
@@ -344,5 +359,5 @@ def _check_path(rows: NDArray[np.float64]) -> None:
         raise InvalidPose("path", "holds NaN or infinity")
     if rows[0, 0] != 0.0 or not (np.diff(rows[:, 0]) > 0.0).all():
         raise InvalidPose("path", "its times must start at 0 and increase")
-    if not (np.linalg.norm(rows[:, 4:8], axis=1) > _SMALLEST_QUATERNION).all():
+    if not (np.linalg.norm(rows[:, 4:8], axis=1) > SMALLEST_QUATERNION).all():
         raise InvalidPose("path", "holds a zero quaternion")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hardware.devices import DEVICES
 from robot.records import LEADER, RECORD, SETTINGS, LeaderKind
 from server.memory.mapped import MappedRing, MappedSlot
 from server.memory.recording_link import create_recording_files
@@ -21,6 +22,11 @@ PATH_STOP = 102
 TROCAR_CHANGE = 103
 BREATHING_CHANGE = 104
 BOARD_CHANGE = 105
+HOME = 106
+RELEASE_TORQUE = 107
+TAKE_HOLD = 108
+REBOOT_DEVICES = 109
+INJECT_FAULT = 110
 """Kinds of REQUEST_MESSAGE beside those of :class:`robot.records.Request`."""
 
 
@@ -63,16 +69,18 @@ REQUEST_MESSAGE = np.dtype(
         ("breathing_amplitude", "f8"),
         ("breathing_period", "f8"),
         ("board", "i8"),
+        ("fault", "S32"),
     ]
 )
 """Web to control: a Request or one of the kinds above, with the fields that belong to it: SI, base
-frame; ``board`` is a place in ``scenes.boards.board.BOARD_NAMES``."""
+frame; ``board`` is a place in ``scenes.boards.board.BOARD_NAMES``; ``fault`` is one of
+``hardware.faulty_plant.FAULTS``, or empty to clear them."""
 
 EMERGENCY = np.dtype([("count", "i8"), ("stamp_ns", "i8")])
 """Web to control: a press of the emergency stop. That it was written at all is the press."""
 
 LEADER_SLOT = np.dtype([("leader", LEADER), ("stamp_ns", "i8")])
-"""Web to control: the newest sample of one leader; ``age_s`` is computed on the other side."""
+"""Leader to control: the newest sample of one leader; ``age_s`` is computed on the other side."""
 
 HOLD_SLOT = np.dtype([("down", "i8"), ("stamp_ns", "i8")])
 """Web to control: whether the hold-to-move control is pressed."""
@@ -119,8 +127,18 @@ HOLD_FILE = "hold.slot"
 ALIVE_FILE = "alive.slot"
 STATUS_FILE = "status.slot"
 SUPERVISION_FILE = "supervision.slot"
-LEADER_KINDS = (LeaderKind.GIZMO, LeaderKind.API_POSE, LeaderKind.API_TARGET)
-"""The leaders whose samples come from the web process; a path is played by control itself."""
+DEVICES_FILE = "devices.slot"
+WEB_LEADER_KINDS = (
+    LeaderKind.GIZMO,
+    LeaderKind.API_POSE,
+    LeaderKind.API_TARGET,
+    LeaderKind.GAMEPAD,
+)
+"""The leaders whose samples always come from the web process."""
+
+LEADER_KINDS = (*WEB_LEADER_KINDS, LeaderKind.STYLUS)
+"""All whose samples come from outside control; a path is played by control itself. The stylus'
+come from the leader process, or from the web process where there is none."""
 
 REQUEST_CAPACITY = 1024
 
@@ -150,6 +168,7 @@ def create_mapped_files(directory: Path, rate_hz: float, ring_seconds: float) ->
         HOLD_FILE: HOLD_SLOT,
         ALIVE_FILE: ALIVE,
         STATUS_FILE: STATUS,
+        DEVICES_FILE: DEVICES,
         SUPERVISION_FILE: SUPERVISION,
     }
     slots.update({leader_file(kind): LEADER_SLOT for kind in LEADER_KINDS})

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hardware.choose import make_plant
+from hardware.choose import simulated_plant
 from robot.calibration import Calibration
 from robot.configuration import Configuration
 from robot.instrument_robot import InstrumentRobot
@@ -144,7 +144,7 @@ class HeadlessRun:
         self.calibration = calibration or calibration_for(configuration, progress)
         self._robot = InstrumentRobot(configuration, self.calibration)
         x = self._robot.initial_state()["x"][0]
-        self._plant = make_plant(configuration, x)
+        self._plant = simulated_plant(configuration, x)
         self._loop = ControlLoop(self._robot, self._plant, configuration)
         self.steps = math.ceil(options.path.duration_s * configuration.control.rate_hz) + 1
         self.dt_s = 1.0 / configuration.control.rate_hz

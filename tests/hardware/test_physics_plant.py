@@ -78,7 +78,7 @@ def play(plant: PhysicsPlant, seconds: float) -> bytes:
         plant.write(here.command(q, here.servos(1.0 + 0.7 * abs(share), 0.1 * share)))
         plant.advance()
         now = plant.read()
-        assert not now.failed
+        assert not now.event
         for part in (now.q, now.servo, now.tension, now.tracker, here.truth(plant)):
             seen += part.tobytes()
     return bytes(seen)
@@ -283,15 +283,15 @@ def test_a_simulation_that_blows_up_is_noticed_and_stands_still(
         plant.change_board(board("ring-board", here.configuration()))
     before, standing = plant.read(), here.truth(plant)
     q, servo = before.q.copy(), before.servo.copy()
-    assert not before.failed
+    assert not before.event
     spoil(plant, what)
     assert plant.advance() == plant.spec.tick_ns
-    assert plant.read().failed
+    assert plant.read().event
     for _ in range(20):
         plant.write(here.command(q + 0.1, servo + 0.1))
         assert plant.advance() == plant.spec.tick_ns
         now = plant.read()
-        assert now.failed
+        assert now.event
         np.testing.assert_array_equal(now.q, q)
         np.testing.assert_array_equal(now.servo, servo)
         assert here.truth(plant).tobytes() == standing.tobytes()

@@ -244,7 +244,7 @@ def test_a_fault_ends_the_run_with_its_reason(
             Failing.reads += 1
             return super().read()._replace(valid=Failing.reads < settling + 100)
 
-    monkeypatch.setattr(headless_run, "make_plant", Failing)
+    monkeypatch.setattr(headless_run, "simulated_plant", Failing)
     assert main(["run", "--plant", "kinematic", "--path", short, "--json", "-"]) == 1
     document = json.loads(capsys.readouterr().out)
     assert document["ended"] == "measurements from the robot stopped"
