@@ -15,6 +15,7 @@ from hardware.devices import DEVICES
 from robot.records import LEADER, RECORD, SETTINGS, LeaderKind
 from server.memory.mapped import MappedRing, MappedSlot
 from server.memory.recording_link import create_recording_files
+from server.memory.stylus_records import create_stylus_files
 
 SETTINGS_CHANGE = 100
 PATH_START = 101
@@ -178,3 +179,4 @@ def create_mapped_files(directory: Path, rate_hz: float, ring_seconds: float) ->
     MappedRing(directory / RECORD_RING_FILE, RECORD, capacity, create=True).close()
     MappedRing(directory / REQUEST_FILE, REQUEST_MESSAGE, REQUEST_CAPACITY, create=True).close()
     create_recording_files(directory)
+    create_stylus_files(directory)

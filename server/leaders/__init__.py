@@ -1,0 +1,1 @@
+"""Leaders that are devices: a stylus behind a rosbridge or a bridge of its own, a gamepad."""
