@@ -43,6 +43,7 @@ class Console:
         arguments: more arguments of the command.
         command: it, and what stands before its options.
         environment: variables beside those of this process.
+        terminal: descriptor of the terminal in which it runs; None for none.
 
     Attributes:
         process: the supervisor.
@@ -58,13 +59,17 @@ class Console:
         *,
         command: tuple[str, ...] = ("console",),
         environment: dict[str, str] | None = None,
+        terminal: int | None = None,
     ) -> None:
         self.directory = directory
-        self._command, self._environment = command, environment or {}
+        # What is measured and tested has no place in the audit log of the robots.
+        state = {"XDG_STATE_HOME": str(directory.with_name(f"{directory.name}.state"))}
+        self._command, self._environment = command, {**state, **(environment or {})}
         options = ["--config", config] if config else []
         self._arguments = [*options, *arguments]
         self._errors = directory.with_name(f"{directory.name}.stderr")
         self._lease = self._trouble = ""
+        self._terminal = subprocess.DEVNULL if terminal is None else terminal
 
     def __enter__(self) -> Self:
         place = ["--run-directory", str(self.directory)]
@@ -72,6 +77,7 @@ class Console:
         with self._errors.open("wb") as errors:
             self.process = subprocess.Popen(
                 module_command("server.command_line", [*fixed, *self._arguments]),
+                stdin=self._terminal,
                 stdout=subprocess.PIPE,
                 stderr=errors,
                 env={**module_environment(), **self._environment},

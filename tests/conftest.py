@@ -19,6 +19,12 @@ def fixed_seeds() -> None:
     np.random.seed(0)  # noqa: NPY002 - a library under test may draw from it
 
 
+@pytest.fixture(autouse=True, scope="session")
+def own_audit_log(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Keep what tests do out of the audit log of this user's robots."""
+    os.environ["XDG_STATE_HOME"] = str(tmp_path_factory.mktemp("state"))
+
+
 @pytest.fixture
 def rng(request: pytest.FixtureRequest) -> np.random.Generator:
     """Random numbers that differ from test to test but never from run to run."""

@@ -28,17 +28,16 @@ class TransitionWatch:
 
     Args:
         directory: the run directory.
-        log: of this process.
-        where: the log's folder.
-        run: identity of the console.
+        log: of this process; it has a folder.
     """
 
-    def __init__(self, directory: Path, log: AuditLog, where: Path, run: str) -> None:
+    def __init__(self, directory: Path, log: AuditLog) -> None:
         self._log = log
         self._ring = MappedRing(directory / RECORD_RING_FILE, RECORD)
         self._sequence, self._known = 0, (-1, -1)
-        for entry in reversed(newest(where, 50, event=STATE_CHANGED)):
-            if entry.get("run") == run and isinstance(entry.get("record"), int):
+        assert log.where is not None
+        for entry in reversed(newest(log.where, 50, event=STATE_CHANGED)):
+            if entry.get("run") == log.run and isinstance(entry.get("record"), int):
                 self._sequence = entry["record"] + 1
                 self._known = (_number(Safety, entry["state"]), _number(Event, entry["reason"]))
                 break

@@ -17,7 +17,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from robot.errors import KeyholeError
 from server.audit import folder as places
+from server.memory.run_directory import RunDirectory
 
 LONGEST_LINE = 4096
 MOST_WAITING = 2000
@@ -61,11 +63,13 @@ class AuditLog:
         run: identity of the console, the same in all its processes.
 
     Attributes:
+        where: as given.
+        run: as given.
         trouble: why the last entry could not be written, empty when it was.
     """
 
     def __init__(self, source: str, where: Path | None, run: str = "") -> None:
-        self._source, self._where, self._run = source, where, run
+        self._source, self.where, self.run = source, where, run
         self._waiting: queue.Queue[_Entry | None] = queue.Queue(MOST_WAITING)
         self._dropped = 0
         self._descriptor: int | None = None
@@ -76,6 +80,14 @@ class AuditLog:
             self._thread = threading.Thread(target=self._run_writer, name="audit", daemon=True)
             self._thread.start()
 
+    @classmethod
+    def of_console(cls, source: str, directory: Path) -> AuditLog:
+        """The writer of a process that belongs to the console in that run directory."""
+        run = ""
+        with contextlib.suppress(KeyholeError, ValueError):
+            run = str(RunDirectory(directory).console().get("started_ns", ""))
+        return cls(source, places.folder(), run)
+
     def note(self, event: str, text: str, **data: object) -> None:
         """Append an entry; returns at once, whatever the disk does.
 
@@ -84,7 +96,7 @@ class AuditLog:
             text: one sentence for people.
             data: what else there is to know.
         """
-        if self._where is None:
+        if self.where is None:
             return
         entry = _Entry(time.time_ns(), time.monotonic_ns(), event, text, data)
         try:
@@ -119,7 +131,7 @@ class AuditLog:
             self._dropped += 1
             self._shut()
             if not self.trouble:
-                _log.error("the audit log cannot be written: %s (%s)", error.strerror, self._where)
+                _log.error("the audit log cannot be written: %s (%s)", error.strerror, self.where)
             self.trouble = error.strerror or "it cannot be written"
 
     def _line(self, entry: _Entry) -> bytes:
@@ -129,7 +141,7 @@ class AuditLog:
             "monotonic_ns": entry.monotonic_ns,
             "source": self._source,
             "pid": os.getpid(),
-            "run": self._run,
+            "run": self.run,
             "event": entry.event,
             "text": " ".join(entry.text.split())[:_LONGEST_TEXT],
         }
@@ -148,14 +160,14 @@ class AuditLog:
 
     def _open_for(self, entry: _Entry) -> None:
         """Have the file open that belongs to the entry's day and has room."""
-        assert self._where is not None
+        assert self.where is not None
         day = datetime.fromtimestamp(entry.time_ns * 1e-9, UTC).strftime("%Y-%m-%d")
         if day != self._day:
             self._shut()
             self._day, self._part = day, 1
         while True:
             if self._descriptor is None:
-                self._descriptor = self._opened(self._where / places.file_of(day, self._part))
+                self._descriptor = self._opened(self.where / places.file_of(day, self._part))
             if os.fstat(self._descriptor).st_size < places.LARGEST_FILE:
                 return
             self._shut()

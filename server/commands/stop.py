@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
 from pathlib import Path
 from typing import Any
@@ -51,11 +50,10 @@ def execute(arguments: argparse.Namespace) -> int:
         NothingToStop: there is no console, it shows a recording, or its control process is down.
     """
     from robot.records import RECORD
-    from server.audit.folder import folder
     from server.audit.writer import AuditLog
     from server.memory.link_records import RECORD_SLOT_FILE
     from server.memory.mapped import MappedSlot
-    from server.memory.run_directory import RunDirectory, default_path
+    from server.memory.run_directory import default_path
     from server.supervision.stop_order import StopOrder
 
     path = arguments.run_directory or default_path()
@@ -69,10 +67,7 @@ def execute(arguments: argparse.Namespace) -> int:
     if took_ms is not None:
         words = f"emergency stop: the robot holds in FAULT after {took_ms:.1f} ms"
     print(f"keyhole: {words}" + ("; use the stop on the machine" if took_ms is None else ""))
-    run = ""
-    with contextlib.suppress(KeyholeError, ValueError):
-        run = str(RunDirectory(path).console()["started_ns"])
-    audit = AuditLog("stop", folder(), run)
+    audit = AuditLog.of_console("stop", path)
     audit.note("emergency_stop", words, by="keyhole stop", user=os.getuid(), took_ms=took_ms)
     audit.close()
     return 0 if took_ms is not None else _NOT_CONFIRMED

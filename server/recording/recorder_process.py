@@ -1,4 +1,5 @@
-"""The recorder process: writes down every record of the ring while a recording is wanted.
+"""The recorder process: writes down every record of the ring while a recording is wanted, and
+every change of the safety state always.
 
 It only reads what the control process publishes. When it falls behind further than the ring
 reaches, or cannot write, control does not notice; the recording says what is missing.
@@ -19,6 +20,8 @@ import numpy as np
 
 from robot.errors import KeyholeError
 from robot.records import RECORD
+from server.audit.transitions import TransitionWatch
+from server.audit.writer import AuditLog
 from server.control.lifeline import Lifeline
 from server.memory.link_records import RECORD_RING_FILE, STATUS, STATUS_FILE
 from server.memory.mapped import MappedReadError, MappedRing, MappedSlot
@@ -238,11 +241,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     lifeline = Lifeline(arguments.lifeline_fd)
     try:
-        recorder = Recorder(RunDirectory(arguments.run_directory))
+        directory = RunDirectory(arguments.run_directory)
+        recorder = Recorder(directory)
+        audit = AuditLog.of_console("recorder", directory.path)
+        transitions = TransitionWatch(directory.path, audit)
         while not ending and not lifeline.is_cut():
             recorder.step()
+            transitions.step()
             time.sleep(_PERIOD_S)
         recorder.close()
+        transitions.step()
+        audit.close()
     except KeyholeError as error:
         print(f"keyhole recorder: {error}", file=sys.stderr, flush=True)
         return 2

@@ -42,20 +42,29 @@ class ConsoleProcess(Console):
         arguments: more arguments of the command.
         command: it, and what stands before its options.
 
+        terminal: descriptor of the terminal in which it runs; None for none.
+
     Attributes:
         recordings: its folder of recordings.
+        audit: its folder of audit logs.
     """
 
     def __init__(
-        self, folder: Path, *arguments: str, command: tuple[str, ...] = ("console",)
+        self,
+        folder: Path,
+        *arguments: str,
+        command: tuple[str, ...] = ("console",),
+        terminal: int | None = None,
     ) -> None:
+        self.audit = folder / "state" / "keyhole" / "audit"
         data = folder / "data"
         self.recordings = data / "keyhole" / "recordings"
         super().__init__(
             folder / "run",
             arguments=arguments,
             command=command,
-            environment={"XDG_DATA_HOME": str(data)},
+            environment={"XDG_DATA_HOME": str(data), "XDG_STATE_HOME": str(folder / "state")},
+            terminal=terminal,
         )
 
     def children(self) -> tuple[int, int]:

@@ -33,7 +33,7 @@ class Watched:
 
     def _start(self) -> None:
         self._log = AuditLog("recorder", self.where, "1")
-        self._watch = TransitionWatch(self._folder, self._log, self.where, "1")
+        self._watch = TransitionWatch(self._folder, self._log)
 
     def step(self) -> None:
         self._watch.step()

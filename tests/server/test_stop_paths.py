@@ -1,0 +1,184 @@
+"""The emergency stops that need no web process, and what the audit log tells of a console."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import signal
+import subprocess
+import termios
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from benchmarks.console import ROBOT
+from robot.records import Safety
+from server.audit.reader import newest
+from server.commands.stop import NothingToStop
+from server.memory.link import WebLink
+from server.memory.link_records import create_mapped_files
+from server.memory.replay_link import create_replay_files
+from server.supervision.child_process import module_environment
+from server.supervision.terminal import Terminal
+from tests.server.console_process import ConsoleProcess, command_line, eventually
+
+
+@pytest.fixture(scope="module")
+def pty() -> Iterator[tuple[int, int]]:
+    """Our end of a terminal, and the console's."""
+    ours, theirs = os.openpty()
+    yield ours, theirs
+    os.close(ours)
+    os.close(theirs)
+
+
+@pytest.fixture(scope="module")
+def console(
+    tmp_path_factory: pytest.TempPathFactory, pty: tuple[int, int]
+) -> Iterator[ConsoleProcess]:
+    """A console in a terminal."""
+    folder = tmp_path_factory.mktemp("console")
+    with ConsoleProcess(folder, "--plant", "kinematic", terminal=pty[1]) as running:
+        running.wait_until_running()
+        yield running
+
+
+@pytest.fixture
+def link(console: ConsoleProcess) -> Iterator[WebLink]:
+    """Enabled, with a web process that hangs for the length of the test."""
+    console.wait_until_running()
+    if console.state()["safety"]["state"] == "FAULT":
+        console.take_lease()
+        console.call("POST", f"{ROBOT}/reset")
+    console.enable()
+    web = console.children()[1]
+    reader = WebLink(console.directory)
+    os.kill(web, signal.SIGSTOP)
+    yield reader
+    os.kill(web, signal.SIGCONT)
+    reader.close()
+    # The answer to it is empty.
+    with contextlib.suppress(ValueError):
+        console.call("DELETE", f"{ROBOT}/lease")
+
+
+def keyhole(console: ConsoleProcess, *arguments: str) -> subprocess.CompletedProcess[str]:
+    state = {"XDG_STATE_HOME": str(console.audit.parents[1])}
+    return subprocess.run(
+        command_line(*arguments),
+        env={**module_environment(), **state},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def safety(link: WebLink) -> tuple[str, int]:
+    state = link.snapshot()["outcome"]["state"]
+    return Safety(int(state["safety"][0])).name, int(state["reason"][0])
+
+
+def test_the_stop_command_needs_no_web_process(console: ConsoleProcess, link: WebLink) -> None:
+    told = keyhole(console, "stop", "--run-directory", str(console.directory))
+    assert told.returncode == 0, told.stderr
+    took = re.search(r"holds in FAULT after ([\d.]+) ms", told.stdout)
+    assert took is not None, told.stdout
+    assert 0.0 <= float(took[1]) < 2000.0
+    assert safety(link)[0] == "FAULT"
+    (entry,) = newest(console.audit, 1, event="emergency_stop")
+    assert (entry["source"], entry["by"]) == ("stop", "keyhole stop")
+    assert entry["took_ms"] == pytest.approx(float(took[1]), abs=0.06)
+
+
+def test_enter_in_the_terminal_stops(
+    console: ConsoleProcess, link: WebLink, pty: tuple[int, int]
+) -> None:
+    os.write(pty[0], b"\n")
+    eventually(lambda: safety(link)[0] == "FAULT", "the robot is stopped")
+    eventually(lambda: "from the terminal: the robot holds after" in console.errors(), "it says so")
+    entry = eventually(
+        lambda: [
+            one
+            for one in newest(console.audit, 10, event="emergency_stop")
+            if one["by"] == "terminal"
+        ],
+        "it is noted",
+    )[0]
+    assert entry["source"] == "supervisor"
+
+
+def test_the_log_tells_starts_and_every_change_of_state(console: ConsoleProcess) -> None:
+    entries = newest(console.audit, 1000)
+    started = {one["process"] for one in entries if one["event"] == "process_started"}
+    assert {"web", "control", "recorder"} <= started
+    assert entries[0]["source"] == "supervisor"
+    assert len({one["run"] for one in entries}) == 1
+    changes = eventually(
+        lambda: (
+            found if len(found := newest(console.audit, 100, event="state_changed")) >= 6 else []
+        ),
+        "the changes are noted",
+    )
+    told = [(one["state"], one["reason"]) for one in changes]
+    assert told[:6] == [
+        ("DISABLED", "NOTHING"), ("ENABLED", "ENABLE"), ("FAULT", "EMERGENCY_STOP"),
+        ("DISABLED", "RESET"), ("ENABLED", "ENABLE"), ("FAULT", "EMERGENCY_STOP"),
+    ]  # fmt: skip
+
+
+def test_a_recorder_that_is_killed_misses_no_change(console: ConsoleProcess) -> None:
+    before = newest(console.audit, 100, event="state_changed")
+    found = newest(console.audit, 1000, event="process_started")
+    recorder = next(one["child"] for one in reversed(found) if one["process"] == "recorder")
+    console.take_lease()
+    os.kill(recorder, signal.SIGKILL)
+    console.call("POST", f"{ROBOT}/reset")
+    console.enable()
+    console.call("POST", f"{ROBOT}/disable")
+    expected = [("DISABLED", "RESET"), ("ENABLED", "ENABLE"), ("DISABLED", "DISABLE")]
+
+    def later() -> list[tuple[str, str]]:
+        after = newest(console.audit, 100, event="state_changed")[len(before) :]
+        return [(one["state"], one["reason"]) for one in after]
+
+    eventually(lambda: later() == expected, "the changes stand in the log, once")
+    ended = newest(console.audit, 10, event="process_ended")
+    assert (ended[-1]["process"], ended[-1]["cause"]) == ("recorder", "signal SIGKILL")
+
+
+def test_where_nothing_runs_the_command_says_what_to_do(
+    console: ConsoleProcess, tmp_path: Path
+) -> None:
+    told = keyhole(console, "stop", "--run-directory", str(tmp_path))
+    assert told.returncode == 2
+    assert "no console runs in" in told.stderr
+    assert "use the stop on the machine" in told.stderr
+    create_mapped_files(tmp_path, 500.0, 0.01)
+    create_replay_files(tmp_path)
+    told = keyhole(console, "stop", "--run-directory", str(tmp_path))
+    assert told.returncode == 2
+    assert "shows a recording" in told.stderr
+    assert NothingToStop(tmp_path, "x").code == "nothing_to_stop"
+
+
+def test_a_terminal_is_read_line_by_line_and_never_waited_for() -> None:
+    ours, theirs = os.openpty()
+    terminal = Terminal(theirs)
+    assert terminal.descriptors() == [theirs]
+    attributes = termios.tcgetattr(theirs)
+    assert attributes[3] & termios.ICANON
+    os.write(ours, b"s\n")
+    assert terminal.pressed()
+    os.write(ours, b"\x04")
+    assert not terminal.pressed()
+    assert terminal.descriptors() == []
+    os.close(ours)
+    os.close(theirs)
+    reading, writing = os.pipe()
+    assert not Terminal(reading).is_there
+    assert not Terminal(None).is_there
+    os.close(reading)
+    os.close(writing)
