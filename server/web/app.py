@@ -13,6 +13,7 @@ from server.memory.link import WebLink
 from server.version import version
 from server.web import (
     api_boards,
+    api_faults,
     api_lease,
     api_motion,
     api_paths,
@@ -76,6 +77,7 @@ def create_app(
     problems.install(app)
     for part in (api_robot, api_lease, api_safety, api_motion, api_paths, api_trocar, api_boards):
         app.include_router(part.router, dependencies=[api_replay.RobotOnly])
+    app.include_router(api_faults.router, dependencies=[api_replay.RobotOnly])
     app.include_router(api_recording.router, dependencies=[api_replay.RobotOnly])
     app.include_router(api_replay.router)
     app.include_router(stream.router)

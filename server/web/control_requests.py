@@ -169,6 +169,15 @@ class ControlRequests:
         record = await self._taken_in(number, _BOARD_S)
         _check_in(record, states, "disable it first")
 
+    async def inject_fault(self, name: str) -> None:
+        """Break the simulated robot, or mend it with "".
+
+        Raises:
+            ControlSilent: control does not answer.
+        """
+        self._source.fresh_record()
+        await self._taken_in(self._link.inject_fault(name))
+
     async def _taken_in(self, number: int, within_s: float = ANSWER_S) -> NDArray[Any]:
         """The first record seen after control had taken in request ``number``."""
         ends = time.monotonic() + within_s
