@@ -25,9 +25,10 @@ _TIME_CONSTANT_S = 0.010
 """Of the velocity: rotor and gears against the motor's own damping."""
 _FRICTION = 0.02
 """Of the gears, while the motor is driven; it is part of the load that a servo reads."""
-_FRICTION_WITHOUT_TORQUE = 0.002
-_LOOSENESS = 4.0
-"""How much faster a load turns the motor when it is not driven: its windings do not brake."""
+_FRICTION_WITHOUT_TORQUE = 0.0003
+_LOOSENESS = 20.0
+"""How much faster a load turns the motor when it is not driven. Both are assumed for the worst: a
+bent segment without torque springs straight."""
 _PWM, _VELOCITY = int(OperatingMode.PWM), int(OperatingMode.VELOCITY)
 _GAIN_UNIT = 1.0 / (128.0 * LARGEST_PWM)
 _STANDS = 1.0

@@ -84,6 +84,8 @@ class Registers:
             if register is None:
                 inside = places[done] in _DEFINED
                 return (StatusError.DATA_LENGTH if inside else StatusError.ACCESS), []
+            if register.access == "r":
+                return StatusError.ACCESS, []
             taken = places[done : done + register.size]
             if list(taken) != list(range(register.address, register.end)):
                 return StatusError.DATA_LENGTH, []
@@ -97,7 +99,7 @@ class Registers:
 
     def _refusal(self, register: Register, value: int) -> StatusError:
         name = register.name
-        if register.access == "r" or (register.eeprom and self.memory[_TORQUE]):
+        if register.eeprom and self.memory[_TORQUE]:
             return StatusError.ACCESS
         if not register.minimum <= value <= register.maximum:
             return StatusError.DATA_RANGE
