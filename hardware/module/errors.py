@@ -106,15 +106,15 @@ class NoRoom(ModuleError):
 
     Attributes:
         zero: tick of the straight segment.
-        half_range: ticks needed on either side.
+        needed: ticks on either side that the largest bend takes, and some more.
     """
 
     code = "servo_no_room"
 
-    def __init__(self, servo: int, zero: int, half_range: int) -> None:
+    def __init__(self, servo: int, zero: int, needed: int) -> None:
         super().__init__(
             [servo],
-            f"straight is at tick {zero}, which leaves less than {half_range} ticks to an end; "
+            f"straight is at tick {zero}, which leaves less than {needed} ticks to an end; "
             "turn the spool on its shaft so that it is near 2048, then home",
         )
-        self.zero, self.half_range = zero, half_range
+        self.zero, self.needed = zero, needed

@@ -16,6 +16,9 @@ from hardware.servos.control_table import CENTRE_TICK
 from robot.configuration import Configuration
 from robot.records import SERVOS
 
+_RESERVE = 1.5
+"""Room that a servo needs around its zero, over what the largest bend takes: for compensation."""
+
 
 class Transmission:
     """Zero and direction of four servos.
@@ -34,6 +37,9 @@ class Transmission:
         self.zero = [CENTRE_TICK] * SERVOS
         self.ticks_per_rad = module.servo_ticks_per_turn / (2.0 * math.pi)
         self.half_range = round(self.ticks_per_rad * math.radians(module.servo_range_deg))
+        bend = math.radians(configuration.limits.bend_deg)
+        ratio = configuration.instrument.tendon_pitch_radius_m / module.pulley_radius_m
+        self._least = min(self.half_range, round(_RESERVE * bend * ratio * self.ticks_per_rad))
         self._last = module.servo_ticks_per_turn - 1
         self._ids = configuration.servos.ids
         self._pulley_radius = module.pulley_radius_m
@@ -42,11 +48,11 @@ class Transmission:
         """These ticks are the straight segment.
 
         Raises:
-            NoRoom: if a servo could not use its range from there.
+            NoRoom: if a servo could not bend the segment as far as it may from there.
         """
         for servo, tick in zip(self._ids, ticks, strict=True):
-            if not self.half_range <= tick <= self._last - self.half_range:
-                raise NoRoom(servo, tick, self.half_range)
+            if not self._least <= tick <= self._last - self._least:
+                raise NoRoom(servo, tick, self._least)
         self.zero = list(ticks)
 
     def ticks(self, angles: Sequence[float], out: list[float]) -> None:

@@ -135,7 +135,10 @@ class CyclicExchange:
     def _fast_answer(self, begin_ns: int) -> int:
         port, counters = self._port, self._counters
         port.wait(begin_ns + self._timeout_ns)
-        count = port.read_into(self._view)
+        count = 0
+        # A terminal hands out 64 bytes at a time.
+        while got := port.read_into(self._view[count:]):
+            count += got
         early = time.monotonic_ns() - begin_ns < self._earliest_ns
         if count > self._wanted or (early and count):
             # Two answers, or one to an earlier question: nobody can tell which is the right one.
