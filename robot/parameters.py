@@ -79,7 +79,7 @@ def _module_rotation(configuration: Configuration) -> np.ndarray:
 
 
 def _unit_vector(vector: tuple[float, float, float]) -> np.ndarray:
-    return np.array(vector) / np.linalg.norm(vector)
+    return np.asarray(vector / np.linalg.norm(vector))
 
 
 def _degrees(value: float) -> float:

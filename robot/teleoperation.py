@@ -149,7 +149,10 @@ def limited_step(
     at ``target_speed``; and no further from the last ``velocity`` (3,), which it replaces, than
     ``acceleration`` permits. The same for metres and for radians.
     """
-    allowed = min(speed, target_speed + math.sqrt(2.0 * acceleration * distance))
+    # The last step of a tick is included: without it every stop would pass its target by one.
+    half = 0.5 * acceleration * dt
+    stopping = math.sqrt(half * half + 2.0 * acceleration * distance) - half
+    allowed = min(speed, target_speed + stopping)
     share = 1.0 if distance <= allowed * dt else allowed * dt / distance
     change = 0.0
     for i in range(3):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from robot.instrument_robot import InstrumentRobot
-from robot.records import OUTCOME, Request, Safety
+from robot.records import OUTCOME, Readiness, Request, Safety
 from robot.safety import (
     MEASUREMENT_TIMEOUT_S,
     REASONS,
@@ -317,3 +317,95 @@ def test_a_simulation_that_broke_down_is_a_fault(
     x = drive.x
     assert stood_still(drive.tick(), x)
     assert drive.safety == following
+
+
+LOST = (Event.BUS_LOST, Event.ARM_LOST)
+DEVICE_FAULTS = (Event.SERVO_SILENT, Event.SERVO_FAULT, Event.ARM_FAULT)
+
+
+@pytest.mark.parametrize("event", LOST)
+def test_a_device_that_is_gone_pauses_and_its_return_moves_nothing(
+    robot: InstrumentRobot, event: Event
+) -> None:
+    drive = driving(robot)
+    x = drive.x
+    drive.input["plant_event"], drive.input["readiness"] = event, Readiness.NOT_CONNECTED
+    assert stood_still(drive.tick(), x)
+    assert (drive.safety, drive.state["reason"][0]) == (P, event)
+    assert stood_still(drive.tick(Request.ENABLE), x)
+    assert drive.safety == P
+    drive.input["plant_event"], drive.input["readiness"] = 0, Readiness.READY
+    for _ in range(10):
+        assert stood_still(drive.tick(), x)
+    assert (drive.safety, drive.state["reason"][0]) == (P, Event.DEVICES_BACK)
+    drive.tick(Request.ENABLE)
+    assert drive.safety == E
+
+
+def test_who_goes_on_after_a_loss_begins_where_the_devices_stopped(robot: InstrumentRobot) -> None:
+    drive = driving(robot)
+    drive.input["plant_event"], drive.input["readiness"] = Event.BUS_LOST, Readiness.NOT_CONNECTED
+    drive.tick()
+    drive.input["plant_event"], drive.input["readiness"] = 0, Readiness.READY
+    drive.tick()
+    stopped = drive.x
+    stopped[7:9] += 0.05
+    drive.obedient = False
+    drive.measure(stopped)
+    drive.let_go()
+    drive.tick(Request.ENABLE)
+    assert drive.safety == E
+    np.testing.assert_allclose(drive.x[:7], stopped[:7], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(drive.x[7:9], stopped[7:9], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("event", DEVICE_FAULTS)
+def test_a_fault_of_a_device_cannot_be_reset_while_it_lasts(
+    robot: InstrumentRobot, event: Event
+) -> None:
+    drive = driving(robot)
+    drive.input["plant_event"] = event
+    drive.tick()
+    assert (drive.safety, drive.state["reason"][0]) == (F, event)
+    drive.tick(Request.RESET)
+    assert drive.safety == F
+    drive.input["plant_event"] = 0
+    drive.tick()
+    assert drive.safety == F
+    drive.tick(Request.RESET)
+    assert drive.safety == D
+
+
+@pytest.mark.parametrize("readiness", list(Readiness)[1:])
+@pytest.mark.parametrize("state", [D, P])
+def test_what_is_not_ready_is_not_enabled(
+    robot: InstrumentRobot, state: Safety, readiness: Readiness
+) -> None:
+    drive = standing_in(robot, state)
+    drive.input["readiness"] = readiness
+    assert stood_still(drive.tick(Request.ENABLE), drive.x)
+    assert drive.safety == state
+
+
+@pytest.mark.parametrize("late_s", [0.101, np.nan, np.inf])
+def test_a_tick_that_is_much_too_late_pauses(robot: InstrumentRobot, late_s: float) -> None:
+    drive = driving(robot)
+    drive.input["late_s"] = 0.09
+    drive.tick()
+    assert drive.safety == E
+    drive.input["late_s"] = late_s
+    drive.tick()
+    assert (drive.safety, drive.state["reason"][0]) == (P, Event.CONTROL_LATE)
+
+
+@pytest.mark.parametrize("servo", range(4))
+def test_a_servo_that_does_not_follow_is_a_fault(robot: InstrumentRobot, servo: int) -> None:
+    limit = np.deg2rad(robot.configuration.limits.servo_tracking_error_deg)
+    drive = driving(robot)
+    drive.obedient = False
+    drive.input["measured_servo"][0, servo] += 0.9 * limit
+    drive.tick()
+    assert drive.safety == E
+    drive.input["measured_servo"][0, servo] += 0.3 * limit
+    drive.tick()
+    assert (drive.safety, drive.state["reason"][0]) == (F, Event.TRACKING_ERROR)
