@@ -79,7 +79,8 @@ def _module_rotation(configuration: Configuration) -> np.ndarray:
 
 
 def _unit_vector(vector: tuple[float, float, float]) -> np.ndarray:
-    return np.asarray(vector / np.linalg.norm(vector))
+    direction = np.array(vector)
+    return np.asarray(direction / np.linalg.norm(direction))
 
 
 def _degrees(value: float) -> float:

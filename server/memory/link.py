@@ -344,9 +344,9 @@ class WebLink:
 
     def close(self) -> None:
         """Unmap every file."""
-        said = [self._record, self._status, self._supervision, self._devices]
-        wanted = [self._emergency, self._hold, self._alive, *self._leaders.values()]
-        for slot in said + wanted:
+        for slot in (self._record, self._status, self._supervision, self._devices):
+            slot.close()
+        for slot in (self._emergency, self._hold, self._alive, *self._leaders.values()):
             slot.close()
         self._requests.close()
 
