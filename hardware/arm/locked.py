@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hardware.arm.device import ArmReading
+from hardware.devices import ARM
 
 
 class LockedArm:
@@ -36,7 +37,9 @@ class LockedArm:
         """Nothing can go wrong with it."""
 
     def fill_devices(self, out: np.ndarray) -> None:
-        """There is no device to tell about."""
+        """That it is locked."""
+        out[0]["arm"] = np.zeros((), ARM)
+        out[0]["arm"]["kind"] = b"locked"
 
     def close(self) -> None:
         """There is no device to give back."""

@@ -9,7 +9,12 @@ from collections.abc import Callable
 import numpy as np
 
 from hardware.arm.device import ArmReading
+from hardware.devices import ARM
 from hardware.physics.preset import Preset
+from robot.records import Readiness
+
+_FOLLOWING = ArmReading()
+_HOLDING = ArmReading(readiness=int(Readiness.TORQUE_OFF))
 
 
 class SimulatedArm:
@@ -40,7 +45,6 @@ class SimulatedArm:
         self._clock = clock
         self._then = clock()
         self._holding = False
-        self._reading = ArmReading()
 
     def read(self, out_q: np.ndarray) -> ArmReading:
         """Where the lag lets it be by now."""
@@ -53,7 +57,7 @@ class SimulatedArm:
             most = self._speed[joint] * dt
             self._q[joint] += min(max(step, -most), most)
         out_q[:] = self._q
-        return self._reading
+        return _HOLDING if self._holding else _FOLLOWING
 
     def write(self, q: np.ndarray) -> None:
         """Follow ``q`` from now on, unless it holds."""
@@ -74,7 +78,9 @@ class SimulatedArm:
         self._holding = False
 
     def fill_devices(self, out: np.ndarray) -> None:
-        """There is no device to tell about."""
+        """That it is simulated."""
+        out[0]["arm"] = np.zeros((), ARM)
+        out[0]["arm"]["kind"] = b"simulated"
 
     def close(self) -> None:
         """There is no device to give back."""

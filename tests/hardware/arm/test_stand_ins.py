@@ -10,7 +10,9 @@ import pytest
 from hardware.arm.device import ArmDevice
 from hardware.arm.locked import LockedArm
 from hardware.arm.simulated import SimulatedArm
+from hardware.devices import DEVICES, DeviceState
 from hardware.physics.preset import PAPER
+from robot.records import Readiness
 
 START = np.array([0.1, 0.4, -0.2, 1.2, 0.1, 1.5, -0.3])
 FAST = np.full(7, 1e9)
@@ -29,9 +31,13 @@ class Clock:
 
 def where(arm: ArmDevice) -> np.ndarray:
     q = np.empty(7)
-    reading = arm.read(q)
-    assert reading == (True, 0.0, 0, 0)
+    valid, age, event, _ = arm.read(q)
+    assert (valid, age, event) == (True, 0.0, 0)
     return q
+
+
+def readiness(arm: ArmDevice) -> int:
+    return arm.read(np.empty(7)).readiness
 
 
 def test_the_locked_arm_stands_whatever_is_asked(rng: np.random.Generator) -> None:
@@ -91,7 +97,9 @@ def test_holding_stands_at_once_and_lasts_until_recovered(act: str) -> None:
     arm.write(START + 0.2)
     clock.now = 1000 * MS
     np.testing.assert_array_equal(where(arm), stood)
+    assert readiness(arm) == Readiness.TORQUE_OFF
     arm.recover()
+    assert readiness(arm) == Readiness.READY
     clock.now = 1010 * MS
     np.testing.assert_array_equal(where(arm), stood)
     arm.write(stood + 0.05)
@@ -108,3 +116,16 @@ def test_a_clock_that_goes_back_moves_nothing() -> None:
     q = where(arm)
     np.testing.assert_array_equal(q, START)
     assert not math.isnan(float(q.sum()))
+
+
+def test_they_say_what_they_are() -> None:
+    arms: dict[bytes, ArmDevice] = {
+        b"locked": LockedArm(START),
+        b"simulated": SimulatedArm(START, PAPER, FAST),
+    }
+    for kind, arm in arms.items():
+        devices = np.ones(1, DEVICES)
+        arm.fill_devices(devices)
+        told = devices[0]["arm"]
+        assert (told["kind"], told["state"]) == (kind, DeviceState.SIMULATED)
+        assert devices[0]["bus"]["cycles"] == 1
