@@ -21,8 +21,11 @@ COMMANDS = {
     "study": "server.commands.study",
     "report": "server.commands.report",
     "bench": "benchmarks.command",
+    "doctor": "server.commands.doctor",
     "fake-servos": "server.commands.fake_servos",
     "stop": "server.commands.stop",
+    "fake-stylus": "server.commands.fake_stylus",
+    "faults": "server.commands.faults",
     "states": "server.commands.states",
 }
 """Subcommands and their modules: ``add_parser(subparsers)`` and ``execute(arguments) -> int``."""
