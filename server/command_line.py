@@ -22,6 +22,7 @@ COMMANDS = {
     "report": "server.commands.report",
     "bench": "benchmarks.command",
     "doctor": "server.commands.doctor",
+    "fake-arm": "server.commands.fake_arm",
     "fake-servos": "server.commands.fake_servos",
     "stop": "server.commands.stop",
     "fake-stylus": "server.commands.fake_stylus",

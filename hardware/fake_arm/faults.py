@@ -4,6 +4,24 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from robot.errors import KeyholeError, UnknownName
+
+
+class BadFault(KeyholeError):
+    """A fault on the command line cannot be understood.
+
+    Attributes:
+        text: as it was given.
+    """
+
+    code = "bad_fault"
+
+    def __init__(self, text: str) -> None:
+        super().__init__(
+            f"{text!r} is no fault: give NAME, or NAME:after_ms=5000, or NAME:for_ms=200"
+        )
+        self.text = text
+
 
 class Fault(NamedTuple):
     """One fault.
@@ -34,3 +52,41 @@ FAULTS: dict[str, Fault] = {
     "not-a-number": Fault("reports say that joint 2 stands at no number", 0, True),
 }
 """Every fault there is."""
+
+
+class Wanted(NamedTuple):
+    """A fault that is asked for: after how long, and for how long (0: until it is cleared)."""
+
+    name: str
+    after_ms: float = 0.0
+    for_ms: float = 0.0
+
+
+def wanted_faults(text: str) -> list[Wanted]:
+    """Read ``NAME[:after_ms=N][:for_ms=N]``, separated by commas.
+
+    Raises:
+        UnknownName: there is no such fault.
+        BadFault: what follows a name makes no sense.
+    """
+    found = []
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        name, *options = part.split(":")
+        check_name(name)
+        numbers = {}
+        for option in options:
+            key, _, value = option.partition("=")
+            try:
+                numbers[key] = float(value)
+            except ValueError as error:
+                raise BadFault(part) from error
+        if not numbers.keys() <= {"after_ms", "for_ms"} or min(numbers.values(), default=0) < 0:
+            raise BadFault(part)
+        found.append(Wanted(name, **numbers))
+    return found
+
+
+def check_name(name: str) -> None:
+    """Raise :class:`UnknownName` unless there is such a fault."""
+    if name not in FAULTS:
+        raise UnknownName("fault of the arm", name, tuple(FAULTS))

@@ -1,29 +1,34 @@
-"""The fake controller's sockets: commands, reports, and faults on demand, in one thread."""
+"""The fake controller's sockets: commands, reports, and faults on demand, in a loop that sleeps."""
 
 from __future__ import annotations
 
 import contextlib
-import selectors
+import select
 import socket
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from hardware.arm.address import NORMAL_PORT, REAL_PORT, RICH_PORT, ArmAddress
 from hardware.fake_arm import telling
 from hardware.fake_arm.controller import Controller
-from hardware.fake_arm.faults import FAULTS
+from hardware.fake_arm.faults import FAULTS, Wanted, check_name
 from hardware.fake_arm.wire import PROTOCOLS, Register, Request, RequestReader, answer
-from robot.errors import KeyholeError, UnknownName
+from hardware.fake_servos.control_channel import BadRequest, ControlChannel
+from robot.errors import KeyholeError
 
 _REAL_NS, _SLOW_NS = 10_000_000, 200_000_000
 _LATE_NS = 200_000_000
 _REMEMBERED = 8192
 _CHUNK = 4096
+_ROWS = 5000
+
+_Report: TypeAlias = Callable[[Controller], bytes]
 
 
 class CannotListen(KeyholeError):
@@ -50,10 +55,27 @@ class Goal(NamedTuple):
     q: tuple[float, ...]
 
 
+class _Planned(NamedTuple):
+    due_ns: int
+    begins: bool
+    name: str
+
+
+def _acts(faults: Sequence[Wanted], now: int) -> list[_Planned]:
+    """What shall happen when."""
+    found = []
+    for fault in faults:
+        begin = now + round(fault.after_ms * 1e6)
+        found.append(_Planned(begin, True, fault.name))
+        if fault.for_ms:
+            found.append(_Planned(begin + round(fault.for_ms * 1e6), False, fault.name))
+    return found
+
+
 class _Client:
     """One connection, with what it has not taken yet."""
 
-    def __init__(self, connection: socket.socket, report: Callable[[Controller], bytes] | None):
+    def __init__(self, connection: socket.socket, report: _Report | None):
         self.connection, self.report = connection, report
         self.reader = RequestReader()
         self.waiting = b""
@@ -71,40 +93,52 @@ class _Client:
 
 
 class FakeArm:
-    """A controller that listens; a context manager that starts and ends its thread.
+    """A controller that listens. As a context manager it runs in a thread of its own.
 
     Attributes:
         controller: what it is; change it only through :meth:`inject` and :meth:`clear`.
         address: where it listens.
-        goals: the newest streamed commands that it took or refused.
+        goals: the newest streamed commands, taken or refused.
     """
 
-    def __init__(self, controller: Controller, address: ArmAddress) -> None:
-        """Bind the four ports.
+    def __init__(
+        self,
+        controller: Controller,
+        address: ArmAddress,
+        control: Path | None = None,
+        faults: Sequence[Wanted] = (),
+    ) -> None:
+        """Bind the ports.
 
         Args:
             controller: decides what is answered.
-            address: host and ports.
+            address: host and command port.
+            control: path of a control channel, if there shall be one.
+            faults: what shall happen, counted from now.
 
         Raises:
-            CannotListen: if one of them is taken or not permitted.
+            CannotListen: if a port is taken or not permitted.
         """
         self.controller, self.address = controller, address
         self.goals: deque[Goal] = deque(maxlen=_REMEMBERED)
         self._active: set[str] = set()
-        self._selector = selectors.DefaultSelector()
         self._clients: dict[int, _Client] = {}
-        self._listeners: list[tuple[socket.socket, Callable[[Controller], bytes] | None]] = []
+        self._listeners: dict[int, tuple[socket.socket, _Report | None]] = {}
         self._late: deque[tuple[int, _Client, bytes]] = deque()
         self._asked: deque[Callable[[], None]] = deque()
         self._wake, self._woken = socket.socketpair()
-        self._thread = threading.Thread(target=self._run, name="fake-arm", daemon=True)
+        self._woken.setblocking(False)
+        self._thread = threading.Thread(target=self._turn_until_ended, name="fake-arm", daemon=True)
         self._ending = False
-        self._then = time.monotonic_ns()
+        self._then = self._next_real = self._next_slow = time.monotonic_ns()
+        self._plan = sorted(_acts(faults, self._then))
+        self._channel: ControlChannel | None = None
         try:
             self._bind()
-        except CannotListen:
-            self._close_all()
+            if control is not None:
+                self._channel = ControlChannel(control, self._reply, time.monotonic_ns)
+        except BaseException:
+            self.close()
             raise
 
     def __enter__(self) -> FakeArm:
@@ -115,41 +149,59 @@ class FakeArm:
         self._ending = True
         self._wake.send(b"\0")
         self._thread.join()
-        self._close_all()
+        self.close()
+
+    def run(self, stopped: Callable[[], bool]) -> None:
+        """Serve in the calling thread until ``stopped()``, which is asked at every report."""
+        while not stopped():
+            self._turn()
+
+    def close(self) -> None:
+        """Give the ports back."""
+        for client in list(self._clients.values()):
+            client.connection.close()
+        for listener, _ in self._listeners.values():
+            listener.close()
+        if self._channel is not None:
+            self._channel.close()
+        self._wake.close()
+        self._woken.close()
 
     def inject(self, name: str) -> int:
-        """Let a fault happen; when it did, by the host's monotonic clock in ns.
+        """From another thread: let a fault happen; when it did, by the monotonic clock in ns.
 
         Raises:
-            UnknownName: if there is no such fault.
+            UnknownName: there is no such fault.
         """
         return self._in_thread(name, self._inject)
 
     def clear(self, name: str) -> int:
-        """Take the cause of a lasting fault away; when that was, in ns. Errors it raised stay.
+        """From another thread: take the cause of a lasting fault away; when that was, in ns.
+
+        Errors that it raised stay until they are cleaned.
 
         Raises:
-            UnknownName: if there is no such fault.
+            UnknownName: there is no such fault.
         """
         return self._in_thread(name, self._clear)
 
-    def state(self) -> dict[str, object]:
+    def state(self) -> dict[str, Any]:
         """What the controller is and does, for people."""
         it = self.controller
         return {
             "mode": it.mode,
             "state": it.state,
-            "error": it.error,
-            "warning": it.warning,
+            "error": int(it.error),
+            "warning": int(it.warning),
             "enabled": it.enabled,
             "joints_rad": [round(float(angle), 6) for angle in it.q],
             "faults": sorted(self._active),
             "clients": len(self._clients),
+            "cpu_s": time.process_time(),
         }
 
     def _in_thread(self, name: str, act: Callable[[str], None]) -> int:
-        if name not in FAULTS:
-            raise UnknownName("fault of the arm", name, tuple(FAULTS))
+        check_name(name)
         done, stamps = threading.Event(), [0]
 
         def asked() -> None:
@@ -162,8 +214,27 @@ class FakeArm:
         done.wait()
         return stamps[0]
 
+    def _reply(self, request: dict[str, Any]) -> dict[str, Any]:
+        """What the control channel answers."""
+        if "inject" in request:
+            check_name(str(request["inject"]))
+            self._inject(str(request["inject"]))
+            return {}
+        if "clear" in request:
+            wanted = request["clear"]
+            for name in FAULTS if wanted is True else [str(wanted)]:
+                check_name(name)
+                self._clear(name)
+            return {}
+        if "state" in request:
+            return self.state()
+        if "goals" in request:
+            since, rows = int(request.get("since_ns", 0)), int(request.get("rows", _ROWS))
+            return {"goals": [goal for goal in self.goals if goal.stamp_ns > since][-rows:]}
+        raise BadRequest("ask for inject, clear, state or goals")
+
     def _bind(self) -> None:
-        ports = (
+        ports: tuple[tuple[int, _Report | None], ...] = (
             (self.address.control, None),
             (NORMAL_PORT, telling.normal),
             (RICH_PORT, telling.rich),
@@ -171,7 +242,7 @@ class FakeArm:
         )
         for port, report in ports:
             listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-            self._listeners.append((listener, report))
+            self._listeners[listener.fileno()] = (listener, report)
             listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
                 listener.bind((self.address.host, port))
@@ -180,45 +251,49 @@ class FakeArm:
                 reason = error.strerror or str(error)
                 raise CannotListen(self.address.host, port, reason) from error
             listener.setblocking(False)
-            self._selector.register(listener, selectors.EVENT_READ)
-        self._woken.setblocking(False)
-        self._selector.register(self._woken, selectors.EVENT_READ)
 
-    def _run(self) -> None:
-        reports = dict(self._listeners)
-        next_real = next_slow = time.monotonic_ns()
+    def _turn_until_ended(self) -> None:
         while not self._ending:
-            due = min(next_real, next_slow, self._late[0][0] if self._late else next_real)
-            ready = self._selector.select(max(due - time.monotonic_ns(), 0) * 1e-9)
-            for key, _ in ready:
-                found = key.fileobj
-                if found is self._woken:
-                    self._woken.recv(_CHUNK)
-                elif found in reports:
-                    self._accept(found, reports[found])
-                else:
-                    self._serve(self._clients.get(key.fd))
-            while self._asked:
-                self._asked.popleft()()
-            now = time.monotonic_ns()
-            self._pass_time(now)
-            while self._late and self._late[0][0] <= now:
-                _, client, data = self._late.popleft()
-                self._send(client, data)
-            if now >= next_real:
-                self._report(telling.real)
-                next_real = max(next_real + _REAL_NS, now)
-            if now >= next_slow:
-                self._report(telling.normal)
-                self._report(telling.rich)
-                next_slow = max(next_slow + _SLOW_NS, now)
+            self._turn()
+
+    def _turn(self) -> None:
+        """Wait for the next thing to do, and do it."""
+        due = min(self._next_real, self._late[0][0] if self._late else self._next_real)
+        channel = self._channel.descriptors() if self._channel is not None else []
+        waited = [self._woken.fileno(), *self._listeners, *self._clients, *channel]
+        ready = select.select(waited, [], [], max(due - time.monotonic_ns(), 0) * 1e-9)[0]
+        for descriptor in ready:
+            if descriptor in self._listeners:
+                self._accept(*self._listeners[descriptor])
+            elif descriptor in self._clients:
+                self._serve(self._clients[descriptor])
+            elif descriptor in channel and self._channel is not None:
+                self._channel.serve(descriptor)
+            elif descriptor == self._woken.fileno():
+                self._woken.recv(_CHUNK)
+        while self._asked:
+            self._asked.popleft()()
+        now = time.monotonic_ns()
+        while self._plan and self._plan[0].due_ns <= now:
+            planned = self._plan.pop(0)
+            (self._inject if planned.begins else self._clear)(planned.name)
+        self._pass_time(now)
+        while self._late and self._late[0][0] <= now:
+            _, client, data = self._late.popleft()
+            self._send(client, data)
+        if now >= self._next_real:
+            self._report(telling.real)
+            self._next_real = max(self._next_real + _REAL_NS, now)
+        if now >= self._next_slow:
+            self._report(telling.normal)
+            self._report(telling.rich)
+            self._next_slow = max(self._next_slow + _SLOW_NS, now)
 
     def _pass_time(self, now: int) -> None:
         self.controller.advance((now - self._then) * 1e-9)
         self._then = now
 
-    def _accept(self, listener: object, report: Callable[[Controller], bytes] | None) -> None:
-        assert isinstance(listener, socket.socket)
+    def _accept(self, listener: socket.socket, report: _Report | None) -> None:
         try:
             connection, _ = listener.accept()
         except OSError:
@@ -229,11 +304,8 @@ class FakeArm:
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._clients[connection.fileno()] = _Client(connection, report)
-        self._selector.register(connection, selectors.EVENT_READ)
 
-    def _serve(self, client: _Client | None) -> None:
-        if client is None:
-            return
+    def _serve(self, client: _Client) -> None:
         try:
             received = client.connection.recv(_CHUNK)
         except BlockingIOError:
@@ -261,7 +333,7 @@ class FakeArm:
         else:
             self._send(client, answer(request, status, data))
 
-    def _report(self, form: Callable[[Controller], bytes]) -> None:
+    def _report(self, form: _Report) -> None:
         clients = [client for client in self._clients.values() if client.report is form]
         if not clients or self._active & {"silent", "no-reports"}:
             return
@@ -280,9 +352,7 @@ class FakeArm:
             self._drop(client)
 
     def _drop(self, client: _Client) -> None:
-        descriptor = client.connection.fileno()
-        if self._clients.pop(descriptor, None) is not None:
-            self._selector.unregister(client.connection)
+        if self._clients.pop(client.connection.fileno(), None) is not None:
             client.connection.close()
 
     def _inject(self, name: str) -> None:
@@ -302,12 +372,3 @@ class FakeArm:
     def _clear(self, name: str) -> None:
         self._active.discard(name)
         self.controller.pressed.discard(FAULTS[name].error)
-
-    def _close_all(self) -> None:
-        for client in list(self._clients.values()):
-            client.connection.close()
-        for listener, _ in self._listeners:
-            listener.close()
-        self._selector.close()
-        self._wake.close()
-        self._woken.close()
