@@ -111,12 +111,13 @@ class CyclicExchange:
         if port.discard():
             self._counters.strays += 1
         port.expect(self._wanted if self._fast else 1)
+        # Taken before: whoever is put aside behind the write would find its answer too early.
+        begin = time.monotonic_ns()
         if goals is None:
             port.write(self._read_only)
         else:
             self._put(goals)
             port.write(self._out)
-        begin = time.monotonic_ns()
         if self._fast:
             return self._fast_answer(begin)
         return self._plain_answer(begin + self._timeout_ns)
