@@ -89,6 +89,9 @@ class ControlChannel:
             return {"ok": False, "stamp_ns": stamp_ns, "code": "bad_json", "message": str(error)}
         except KeyholeError as error:
             return {"ok": False, "stamp_ns": stamp_ns, "code": error.code, "message": str(error)}
+        except (TypeError, ValueError, OSError) as error:
+            # What a request holds is a stranger's: it must not end the program.
+            return {"ok": False, "stamp_ns": stamp_ns, "code": "bad_value", "message": str(error)}
         return {"ok": True, "stamp_ns": stamp_ns} | answer
 
     def close(self) -> None:

@@ -54,8 +54,11 @@ class Options:
 
 
 def control_path(link: Path) -> Path:
-    """Where the control channel of the servos at this port stands."""
-    return link.with_name(f"{link.name}.control")
+    """Where the control channel of the servos at this port stands.
+
+    Hidden, so that a host that looks for ports by a pattern does not take it for one.
+    """
+    return link.with_name(f".{link.name}.control")
 
 
 class Program:

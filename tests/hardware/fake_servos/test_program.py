@@ -187,6 +187,8 @@ def test_a_condition_ends_when_its_time_is_over(fake: FakeServos) -> None:
         ({"inject": "nothing"}, "unknown fault"),
         ({"inject": "late", "servo": 1}, "there is no servo 1"),
         ({"dance": True}, "send one of: inject"),
+        ({"goals": True, "since_ns": "yesterday"}, "bad_value"),
+        ({"replug": "no/such/folder"}, "bad_value"),
     ],
 )
 def test_bad_requests_are_refused(
