@@ -303,6 +303,9 @@ def _keep_inside(
         if inside != target[i]:
             outcome[0].report.target_refused = _OUTSIDE
             target[i] = inside
+    if s.leader_kind == _PATH:
+        # A path is judged against itself; how far the shaft comes out is limited anyway.
+        return
     height, here = 0.0, 0.0
     for i in range(3):
         height += (target[i] - trocar[i]) * p.wall_normal[i]

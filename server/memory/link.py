@@ -344,9 +344,9 @@ class WebLink:
 
     def close(self) -> None:
         """Unmap every file."""
-        for slot in (self._record, self._status, self._supervision, self._devices):
-            slot.close()
-        for slot in (self._emergency, self._hold, self._alive, *self._leaders.values()):
+        slots = [self._record, self._status, self._supervision, self._devices]
+        slots += [self._emergency, self._hold, self._alive]
+        for slot in slots + list(self._leaders.values()):
             slot.close()
         self._requests.close()
 
