@@ -88,7 +88,7 @@ async def leaders(services: ServicesHere) -> LeadersView:
             buttons=int(said["buttons"]),
             buttons_repeat=bool(said["buttons_repeat"]),
             clutch=bool(said["clutch"]),
-            mode=DriveMode(int(said["mode"])).name.lower(),  # type: ignore[arg-type]
+            mode=DriveMode(int(said["mode"])).name.lower(),
             force_n=round(float(said["force_n"]), 3),
             counts=StylusCounts(**{name: int(said["counts"][name]) for name in STYLUS_COUNTS}),
         )
