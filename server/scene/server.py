@@ -28,6 +28,9 @@ class SceneServer:
     Args:
         configuration: dimensions and where things start.
         link: to the control process.
+
+    Attributes:
+        on_failure: called with what failed, once for each kind, from any thread.
     """
 
     def __init__(self, configuration: Configuration, link: WebLink) -> None:
@@ -37,6 +40,7 @@ class SceneServer:
         self._address: ViserAddress | None = None
         self._viser: ViserServer | None = None
         self._view: SceneView | None = None
+        self.on_failure: Callable[[str], None] = lambda _: None
 
     def state(self) -> str:
         """``loading``, ``ready``, or why there is no scene."""
@@ -64,6 +68,7 @@ class SceneServer:
             # The console must stay usable without its picture, and say why there is none.
             _log.exception("the scene could not be loaded")
             self._state = f"failed: {type(error).__name__}: {error}"
+            self.on_failure(f"{type(error).__name__}: {error}")
         afterwards()
 
     def _load(self) -> None:
@@ -79,9 +84,13 @@ class SceneServer:
         self._viser = viser.ViserServer("127.0.0.1", 0, verbose=False)
         guard(self._viser, secret)
         self._view = SceneView(self._viser, self._configuration, self._link)
+        self._view.on_failure = self._failed
         self._view.start()
         self._address = ViserAddress(self._viser.get_port(), secret)
         self._state = "ready"
+
+    def _failed(self, words: str) -> None:
+        self.on_failure(words)
 
     def stop(self) -> None:
         """End the view and viser."""

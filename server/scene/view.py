@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -45,6 +46,8 @@ UNWATCHED_PERIOD = 1.0
 BOARD_PERIOD = 0.5
 """Between two looks at which board is there, s."""
 
+_MOST_FAILURES = 8
+
 log = logging.getLogger(__name__)
 
 
@@ -59,7 +62,11 @@ class SceneLink(GizmoLink, Protocol):
 
 
 class SceneView:
-    """Draws the newest record until stopped."""
+    """Draws the newest record until stopped.
+
+    Attributes:
+        on_failure: called from its thread with the first failure of each kind, in words.
+    """
 
     def __init__(
         self,
@@ -107,7 +114,8 @@ class SceneView:
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._drawn = self._looked = -np.inf
-        self._failed = False
+        self._failures: set[str] = set()
+        self.on_failure: Callable[[str], None] = lambda _: None
 
     def start(self) -> None:
         """Draw from a thread of its own."""
@@ -128,13 +136,20 @@ class SceneView:
                 self.step(time.monotonic())
             except KeyholeError as error:
                 log.debug("no picture: %s", error)
-            except Exception:
+            except Exception as error:
                 # One bad picture must not end the rest; a held gizmo goes stale by itself.
-                if not self._failed:
-                    log.exception("the scene could not be drawn; told once")
-                self._failed = True
+                self._tell(error)
             deadline = max(deadline + PERIOD, time.monotonic())
             self._stop.wait(deadline - time.monotonic())
+
+    def _tell(self, error: Exception) -> None:
+        """Tell a failure; of each kind only the first, of a few kinds."""
+        kind = type(error).__name__
+        if kind in self._failures or len(self._failures) > _MOST_FAILURES:
+            return
+        self._failures.add(kind)
+        log.exception("the scene could not be drawn; told once")
+        self.on_failure(f"{kind}: {error}"[:200])
 
     def step(self, now: float) -> None:
         """Draw the newest record once.

@@ -1,7 +1,9 @@
 """Who may speak to the server: the token, the session cookie, the Origin and the Host.
 
-A session cookie is a random identity signed with the token, so that the server keeps no list of
-sessions and a restarted web process still knows the pages that are open.
+A session cookie is a random identity and the time of its admission, signed with the token, so that
+the server keeps no list of sessions and a restarted web process still knows the pages that are
+open. Times are those of the monotonic clock: setting the wall clock lengthens or ends no session.
+The token itself, which programs send with every request, is valid until the console ends.
 """
 
 from __future__ import annotations
@@ -9,19 +11,28 @@ from __future__ import annotations
 import hashlib
 import hmac
 import ipaddress
+import math
 import secrets
 import socket
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
-from server.web.refusals import ForeignHost, ForeignOrigin, NotAdmitted
+from server.web.refusals import (
+    ForeignHost,
+    ForeignOrigin,
+    NotAdmitted,
+    SessionExpired,
+    WrongToken,
+)
 
 COOKIE = "keyhole_session"
 LEASE_HEADER = "x-keyhole-lease"
 _LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 _WILDCARDS = ("", "0.0.0.0", "::", "[::]", "*")
 _LONGEST_HEADER = 512
+_MOST_RENEWED = 1000
 
 
 @dataclass(frozen=True)
@@ -31,10 +42,12 @@ class Caller:
     Attributes:
         session: identity of the browser session, None for a caller with a bearer token.
         lease_id: the lease it says it acts under, if any.
+        ends: when its session ends, s on the monotonic clock.
     """
 
     session: str | None
     lease_id: str | None
+    ends: float = math.inf
 
 
 def names_of(host: str) -> tuple[str, ...]:
@@ -79,12 +92,27 @@ class Access:
     Args:
         token: the console's secret.
         host: address the server is bound to.
+        session_hours: how long a browser stays let in.
+        clock: monotonic clock in seconds.
     """
 
-    def __init__(self, token: str, host: str) -> None:
+    def __init__(
+        self,
+        token: str,
+        host: str,
+        session_hours: float = 12.0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._token = token.encode()
+        self._hours, self._clock = session_hours, clock
+        self._renewed: dict[str, float] = {}
         self._names = names_of(host)
         self._any_address = host in _WILDCARDS
+
+    @property
+    def hours(self) -> float:
+        """How long a session lasts."""
+        return self._hours
 
     def token_is(self, offered: str | None) -> bool:
         """Whether ``offered`` is the token, compared in constant time."""
@@ -92,19 +120,39 @@ class Access:
             return False
         return hmac.compare_digest(offered.encode(), self._token)
 
-    def new_cookie(self) -> str:
-        """Value of a cookie for a fresh session."""
-        identity = secrets.token_urlsafe(18)
-        return f"{identity}.{self._signature(identity)}"
+    def new_cookie(self, before: str | None = None) -> str:
+        """Value of a cookie that lasts its full time from now on.
 
-    def session_of(self, cookie: str | None) -> str | None:
-        """Identity that a cookie's value proves, or None."""
+        Args:
+            before: the browser's present cookie: who renews a session in time stays who they are.
+        """
+        identity = self.session_of(before) or secrets.token_urlsafe(18)
+        now = self._clock()
+        if len(self._renewed) >= _MOST_RENEWED:
+            del self._renewed[next(iter(self._renewed))]
+        self._renewed[identity] = now + self._hours * 3600.0
+        proven = f"{identity}.{int(now)}"
+        return f"{proven}.{self._signature(proven)}"
+
+    def _proven(self, cookie: str | None) -> tuple[str, float] | None:
+        """Identity that a cookie's value proves, and when its session ends or ended."""
         if not cookie or len(cookie) > _LONGEST_HEADER:
             return None
-        identity, _, signature = cookie.partition(".")
-        if not hmac.compare_digest(signature.encode(), self._signature(identity).encode()):
+        proven, _, signature = cookie.rpartition(".")
+        if not hmac.compare_digest(signature.encode(), self._signature(proven).encode()):
             return None
-        return identity
+        identity, _, admitted = proven.partition(".")
+        return identity, int(admitted) + self._hours * 3600.0
+
+    def session_of(self, cookie: str | None) -> str | None:
+        """Identity that a cookie's value proves, or None, also where its session has ended."""
+        found = self._proven(cookie)
+        return found[0] if found is not None and self._clock() < found[1] else None
+
+    def left_s(self, caller: Caller) -> float:
+        """Seconds until the caller's session ends; negative when it has ended."""
+        renewed = self._renewed.get(caller.session or "", -math.inf)
+        return max(caller.ends, renewed) - self._clock()
 
     def _signature(self, identity: str) -> str:
         return hmac.new(self._token, identity.encode(), hashlib.sha256).hexdigest()
@@ -147,12 +195,17 @@ class Access:
 
         Raises:
             NotAdmitted: neither token nor session.
+            WrongToken: another token, and no session.
+            SessionExpired: a session that has ended.
         """
         lease_id = headers.get(LEASE_HEADER)
         scheme, _, credentials = headers.get("authorization", "").partition(" ")
-        if scheme.lower() == "bearer" and self.token_is(credentials.strip()):
+        offers = scheme.lower() == "bearer" and credentials.strip() != ""
+        session = self._proven(cookies.get(COOKIE))
+        if offers and self.token_is(credentials.strip()):
             return Caller(self.session_of(cookies.get(COOKIE)), lease_id)
-        session = self.session_of(cookies.get(COOKIE))
         if session is None:
-            raise NotAdmitted
-        return Caller(session, lease_id)
+            raise WrongToken if offers else NotAdmitted
+        if self._clock() >= session[1]:
+            raise SessionExpired(self._hours)
+        return Caller(session[0], lease_id, session[1])

@@ -13,9 +13,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from robot.errors import KeyholeError
 from server.web.access import COOKIE, Access, Caller
+from server.web.events import LONGEST_BODY, Asked, WebEvents
 from server.web.page_headers import headers_for
-from server.web.problems import problem_of, response
-from server.web.refusals import BodyTooLarge, NotAdmitted
+from server.web.problems import problem_of, response, status_of
+from server.web.refusals import BodyTooLarge, NotAdmitted, SessionExpired, WrongToken
 
 OPEN_PATHS = ("/api/v1/health",)
 """Answered without a token, as a watchdog needs it; tells nothing of the robot."""
@@ -24,14 +25,24 @@ LARGEST_BODY = 65_536
 LARGEST_PATH_BODY = 24_000_000
 """Bytes; a path of the most rows that are allowed fits into it."""
 
-_WELCOME = """<!doctype html>
+_PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="color-scheme" content="light dark">
 <meta name="viewport" content="width=device-width"><title>Keyhole: not admitted</title></head>
-<body><h1>This console needs its token</h1>
+<body><h1>{title}</h1>
 <p>Open the address that <code>keyhole</code> printed when it started: it ends in
-<code>/?token=…</code> and lets this browser in until the console ends.</p>
-<p>A console that was started again has a new token.</p></body></html>
+<code>/?token=…</code> and lets this browser in {how_long}.</p>
+<p>{more}</p></body></html>
 """
+_NEW_TOKEN = "A console that was started again has a new token."
+_ROBOT_SAFE = "The robot is not affected; whoever drove it with this browser has let it go."
+
+
+def _welcome(refusal: KeyholeError | None, hours: float) -> str:
+    """The page for who is not let in: why, and how to get in."""
+    title, more = "This console needs its token", _NEW_TOKEN
+    if isinstance(refusal, SessionExpired):
+        title, more = "This browser's session has ended", _ROBOT_SAFE
+    return _PAGE.format(title=title, how_long=f"for {hours:g} hours", more=more)
 
 
 def caller_of(scope: Scope) -> Caller:
@@ -54,10 +65,11 @@ class AccessGuard:
     Args:
         app: what lies behind the door.
         access: who may pass.
+        events: where requests and refusals are noted.
     """
 
-    def __init__(self, app: ASGIApp, access: Access) -> None:
-        self._app, self._access = app, access
+    def __init__(self, app: ASGIApp, access: Access, events: WebEvents) -> None:
+        self._app, self._access, self._events = app, access, events
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Admit or refuse; see the class."""
@@ -65,17 +77,31 @@ class AccessGuard:
             await self._app(scope, receive, send)
             return
         headers = Headers(scope=scope)
+        seen = bytearray()
         try:
             port = self._check_way(scope, headers)
             if scope["type"] == "http" and _offers_token(scope):
-                await self._let_in(scope)(scope, receive, send)
+                await self._let_in(scope, headers)(scope, receive, send)
                 return
             self._admit(scope, headers)
-            receive = self._bounded(scope, headers, receive)
+            receive = self._bounded(scope, headers, receive, seen)
         except KeyholeError as refusal:
+            self._events.asked(self._asked(scope, seen), status_of(refusal), refusal)
             await self._refuse(refusal, scope, receive, send)
             return
-        await self._app(scope, receive, self._with_headers(scope, port, headers, send))
+        status = [0]
+        try:
+            await self._app(scope, receive, self._with_headers(scope, port, headers, send, status))
+        finally:
+            if scope["type"] == "http":
+                why = scope.get("state", {}).get("refusal")
+                self._events.asked(self._asked(scope, seen), status[0], why)
+
+    @staticmethod
+    def _asked(scope: Scope, body: bytearray) -> Asked:
+        address = scope["client"][0] if scope.get("client") else "an unknown address"
+        caller = scope.get("state", {}).get("caller")
+        return Asked(scope.get("method", "GET"), scope["path"], address, caller, bytes(body))
 
     def _check_way(self, scope: Scope, headers: Mapping[str, str]) -> int:
         secure = scope["scheme"] in ("https", "wss")
@@ -89,20 +115,28 @@ class AccessGuard:
         caller = self._access.caller(headers, _cookies(headers.get("cookie", "")))
         scope.setdefault("state", {})["caller"] = caller
 
-    def _let_in(self, scope: Scope) -> Response:
+    def _let_in(self, scope: Scope, headers: Mapping[str, str]) -> Response:
         """Answer ``/?token=TOKEN``: a cookie, and away with the token from the address bar."""
+        asked = self._asked(scope, bytearray())
         if not self._access.token_is(_offered_token(scope)):
-            return HTMLResponse(_WELCOME, 401, headers=headers_for("/"))
+            self._events.refused(asked, WrongToken())
+            return self._turned_away(None)
+        self._events.note("let_in", f"a browser at {asked.address} was let in", by=asked.address)
         answer = RedirectResponse("/", 303, headers=headers_for("/"))
         secure = scope["scheme"] == "https"
         answer.set_cookie(
-            COOKIE, self._access.new_cookie(), path="/", httponly=True, samesite="strict",
-            secure=secure,
+            COOKIE, self._access.new_cookie(_cookies(headers.get("cookie", "")).get(COOKIE)),
+            path="/", httponly=True, samesite="strict", secure=secure,
         )  # fmt: skip
         return answer
 
-    def _bounded(self, scope: Scope, headers: Mapping[str, str], receive: Receive) -> Receive:
-        """``receive`` that refuses to read more of a body than makes sense."""
+    def _turned_away(self, refusal: KeyholeError | None) -> Response:
+        return HTMLResponse(_welcome(refusal, self._access.hours), 401, headers=headers_for("/"))
+
+    def _bounded(
+        self, scope: Scope, headers: Mapping[str, str], receive: Receive, kept: bytearray
+    ) -> Receive:
+        """``receive`` that refuses to read more of a body than makes sense; keeps its start."""
         if scope["type"] != "http":
             return receive
         limit = LARGEST_PATH_BODY if scope["path"].endswith("/path") else LARGEST_BODY
@@ -114,7 +148,9 @@ class AccessGuard:
         async def bounded() -> Message:
             nonlocal seen
             message = await receive()
-            seen += len(message.get("body", b""))
+            part = message.get("body", b"")
+            seen += len(part)
+            kept.extend(part[: LONGEST_BODY - len(kept)])
             if seen > limit:
                 # The framework turns every other exception into a body that cannot be parsed.
                 raise HTTPException(413, str(BodyTooLarge(limit)))
@@ -129,12 +165,14 @@ class AccessGuard:
         if scope["type"] == "websocket":
             await _refuse_websocket(refusal, scope, send)
         elif page:
-            await HTMLResponse(_WELCOME, 401, headers=headers_for("/"))(scope, receive, send)
+            await self._turned_away(refusal)(scope, receive, send)
         else:
             await response(problem_of(refusal))(scope, receive, send)
 
     @staticmethod
-    def _with_headers(scope: Scope, port: int, headers: Mapping[str, str], send: Send) -> Send:
+    def _with_headers(
+        scope: Scope, port: int, headers: Mapping[str, str], send: Send, status: list[int]
+    ) -> Send:
         if scope["type"] != "http":
             return send
         extra = headers_for(scope["path"], headers.get("host", ""))
@@ -142,6 +180,7 @@ class AccessGuard:
 
         async def with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
+                status[0] = message["status"]
                 message["headers"] = [*message["headers"], *encoded]
             await send(message)
 

@@ -7,6 +7,7 @@ from starlette.responses import Response
 
 from robot.records import Request
 from server.web.api_robot import ROBOT, STATE
+from server.web.refusals import HandingOver
 from server.web.services import AnyCaller, Operator, ServicesHere
 
 router = APIRouter(prefix=ROBOT, tags=["safety"], responses=STATE)
@@ -28,7 +29,12 @@ async def pause(services: ServicesHere, caller: AnyCaller) -> Response:
 
 @router.post("/enable", summary="Let the leader move the tip")
 async def enable(services: ServicesHere, caller: Operator) -> Response:
-    """409 with the reason where the transition table does not allow it."""
+    """409 with the reason where the transition table does not allow it, the devices are not
+    ready, the shaft does not go through the trocar, or control is being handed over.
+    """
+    offered_to = services.lease.offered_to
+    if offered_to is not None:
+        raise HandingOver(offered_to)
     await services.requests.ask(Request.ENABLE)
     return services.state(caller)
 

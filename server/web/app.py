@@ -9,10 +9,13 @@ from collections.abc import AsyncIterator, Callable
 from fastapi import FastAPI
 
 from robot.configuration import Configuration
+from server.audit.writer import AuditLog
 from server.memory.link import WebLink
 from server.version import version
 from server.web import (
+    api_audit,
     api_boards,
+    api_devices,
     api_faults,
     api_lease,
     api_motion,
@@ -21,6 +24,7 @@ from server.web import (
     api_replay,
     api_robot,
     api_safety,
+    api_stylus,
     api_trocar,
     problems,
     stream,
@@ -38,6 +42,7 @@ def create_app(
     access: Access,
     viser_address: Callable[[], ViserAddress | None] = lambda: None,
     scene: Callable[[], str] = lambda: "loading",
+    audit: AuditLog | None = None,
 ) -> FastAPI:
     """Make the application of one console.
 
@@ -47,8 +52,9 @@ def create_app(
         access: who may speak.
         viser_address: where viser listens; None while it is not there yet.
         scene: ``loading``, ``ready``, or why there is no scene.
+        audit: where requests and refusals are noted; None keeps nothing.
     """
-    services = make_services(configuration, link, scene)
+    services = make_services(configuration, link, access, audit or AuditLog("web", None), scene)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -73,13 +79,16 @@ def create_app(
         redoc_url=None,
     )
     app.state.services = services
-    app.add_middleware(AccessGuard, access=access)
+    app.add_middleware(AccessGuard, access=access, events=services.events)
     problems.install(app)
     for part in (api_robot, api_lease, api_safety, api_motion, api_paths, api_trocar, api_boards):
         app.include_router(part.router, dependencies=[api_replay.RobotOnly])
     app.include_router(api_faults.router, dependencies=[api_replay.RobotOnly])
+    app.include_router(api_devices.router, dependencies=[api_replay.RobotOnly])
+    app.include_router(api_audit.router)
     app.include_router(api_recording.router, dependencies=[api_replay.RobotOnly])
     app.include_router(api_replay.router)
+    app.include_router(api_stylus.router)
     app.include_router(stream.router)
     app.include_router(viser_router(viser_address))
     add_page(app)

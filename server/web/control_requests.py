@@ -15,7 +15,8 @@ from robot.safety import REASONS, Event, check_request, successor
 from scenes.trocar_motion import Breathing
 from server.memory.link import WebLink
 from server.memory.link_records import TrocarSource
-from server.web.refusals import ControlSilent, NotReady
+from server.web.devices_view import readiness_view
+from server.web.refusals import ControlSilent, DevicesNotReady, NotReady
 from server.web.state_source import StateSource
 from server.web.trocar_view import TrocarView
 
@@ -51,6 +52,7 @@ class ControlRequests:
 
         Raises:
             RequestRefused: the transition table does not allow it.
+            DevicesNotReady: it would enable a robot whose devices are not ready.
             NotInserted: it would enable a robot whose shaft does not go through the trocar.
             NotReady: control took it in and did not follow it.
             ControlSilent: control does not answer.
@@ -59,6 +61,7 @@ class ControlRequests:
         before = safety_of(record)
         check_request(before, request)
         if request == Request.ENABLE:
+            check_ready(record)
             self._trocar.check_inserted(record)
         record = await self._taken_in(self._link.request(request))
         wanted, after = successor(before, Event(request)), safety_of(record)
@@ -178,6 +181,18 @@ class ControlRequests:
         self._source.fresh_record()
         await self._taken_in(self._link.inject_fault(name))
 
+    async def ask_devices(
+        self, send: Callable[[], int], states: tuple[Safety, ...], what: str
+    ) -> None:
+        """Ask the devices for something, in one of ``states``; ``what`` leads there.
+
+        Raises:
+            NotReady: the robot is in another state.
+            ControlSilent: control does not answer.
+        """
+        _check_in(self._source.fresh_record(), states, what)
+        await self._taken_in(send())
+
     async def _taken_in(self, number: int, within_s: float = ANSWER_S) -> NDArray[Any]:
         """The first record seen after control had taken in request ``number``."""
         ends = time.monotonic() + within_s
@@ -196,6 +211,13 @@ def _check_in(record: NDArray[Any], states: tuple[Safety, ...], what: str) -> No
     if safety not in states:
         words = "reset it first" if safety == Safety.FAULT else what
         raise NotReady(safety.name, f"the robot is in {safety.name}: {words}")
+
+
+def check_ready(record: NDArray[Any]) -> None:
+    """Raise :class:`DevicesNotReady` unless the (1,) ``record`` says that the devices are ready."""
+    ready = readiness_view(int(record["input"]["readiness"][0]))
+    if ready["state"] != "ready":
+        raise DevicesNotReady(ready["state"], f"{ready['reason']}: {ready['action']}")
 
 
 def check_free(record: NDArray[Any]) -> None:

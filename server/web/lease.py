@@ -6,9 +6,10 @@ import secrets
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from server.web.access import Caller
-from server.web.refusals import LeaseHeld, NotTheOperator
+from server.web.refusals import AlreadyAsked, LeaseHeld, NobodyToAsk, NotTheOperator
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,24 @@ class Holder:
     session: str | None
 
 
+class Wish(NamedTuple):
+    """Somebody asks for control.
+
+    Attributes:
+        operator: the name they gave.
+        session: their browser session, None for a program.
+        ends: when the wish is forgotten, s on the lease's clock.
+    """
+
+    operator: str
+    session: str | None
+    ends: float
+
+
+WISH_S = 60.0
+"""How long a request for control stands without being repeated."""
+
+
 class Lease:
     """The lease of one robot. Not thread safe: it belongs to the event loop.
 
@@ -39,6 +58,8 @@ class Lease:
         self._holder: Holder | None = None
         self._ends = 0.0
         self._offered_to: str | None = None
+        self._offered_session: str | None = None
+        self._wish: Wish | None = None
 
     @property
     def holder(self) -> Holder | None:
@@ -49,6 +70,12 @@ class Lease:
     def offered_to(self) -> str | None:
         """Name to whom the holder has offered it."""
         return self._offered_to if self.holder else None
+
+    @property
+    def wish(self) -> Wish | None:
+        """Who asks the holder for control."""
+        wish = self._wish
+        return wish if wish and self.holder and self._clock() < wish.ends else None
 
     @property
     def expires_in_s(self) -> float | None:
@@ -88,7 +115,8 @@ class Lease:
         """
         before = self.holder
         if before is not None and not self._may_follow(before, operator, caller):
-            raise LeaseHeld(before.operator, self._offered_to, self._ends - self._clock())
+            left_s = self._ends - self._clock()
+            raise LeaseHeld(before.operator, self._offered_to, left_s, operator)
         if before is not None and self.is_held_by(caller):
             self._holder = Holder(operator, before.lease_id, before.session)
             if operator == self._offered_to:
@@ -96,12 +124,46 @@ class Lease:
             before = None
         else:
             self._holder = Holder(operator, secrets.token_urlsafe(18), caller.session)
-            self._offered_to = None
+            self._offered_to = self._wish = None
         self._ends = self._clock() + self._seconds
         return self._holder, before
 
     def _may_follow(self, before: Holder, operator: str, caller: Caller) -> bool:
-        return self.is_held_by(caller) or self._offered_to == operator
+        if self.is_held_by(caller):
+            return True
+        # Who asked and was answered is known; nobody else takes it by calling themselves so.
+        known = self._offered_session
+        return self._offered_to == operator and (known is None or known == caller.session)
+
+    def ask(self, operator: str, caller: Caller) -> Wish:
+        """Ask the holder for control; repeated, it stands for its full time again.
+
+        Raises:
+            NobodyToAsk: nobody else holds it.
+            AlreadyAsked: somebody else asks already.
+        """
+        if self.holder is None or self.is_held_by(caller):
+            raise NobodyToAsk
+        standing = self.wish
+        if standing is not None and (standing.operator, standing.session) != (
+            operator,
+            caller.session,
+        ):
+            raise AlreadyAsked(standing.operator)
+        self._wish = Wish(operator, caller.session, self._clock() + WISH_S)
+        return self._wish
+
+    def end_wish(self, caller: Caller) -> Wish | None:
+        """Withdraw one's own request for control, or decline another's; returns it.
+
+        Raises:
+            NotTheOperator: it is another's, and ``caller`` does not hold the lease.
+        """
+        wish = self.wish
+        if wish is not None and (caller.session is None or wish.session != caller.session):
+            self.check(caller)
+        self._wish = None
+        return wish
 
     def renew(self, caller: Caller) -> Holder:
         """Let the lease last its full time from now on.
@@ -120,7 +182,19 @@ class Lease:
             NotTheOperator: ``caller`` does not hold it.
         """
         self.renew(caller)
+        wish = self.wish
         self._offered_to = to
+        self._offered_session = wish.session if wish is not None and wish.operator == to else None
+
+    def withdraw_offer(self, caller: Caller) -> str | None:
+        """Keep it after all; returns to whom it was offered.
+
+        Raises:
+            NotTheOperator: ``caller`` does not hold it.
+        """
+        self.renew(caller)
+        to, self._offered_to = self._offered_to, None
+        return to
 
     def release(self, caller: Caller) -> Holder:
         """Give it back.
@@ -129,7 +203,7 @@ class Lease:
             NotTheOperator: ``caller`` does not hold it.
         """
         holder = self.check(caller)
-        self._holder, self._offered_to = None, None
+        self._holder = self._offered_to = self._wish = None
         return holder
 
     def expire(self) -> Holder | None:
@@ -137,5 +211,5 @@ class Lease:
         holder = self._holder
         if holder is None or self.holder is not None:
             return None
-        self._holder, self._offered_to = None, None
+        self._holder = self._offered_to = self._wish = None
         return holder

@@ -11,6 +11,7 @@ from robot.records import Request, Safety
 from server.memory.link import WebLink
 from server.web.access import Caller
 from server.web.api_leaders import REPEAT_S, PoseLeader, TargetLeader
+from server.web.events import WebEvents
 from server.web.lease import Lease
 from server.web.state_source import StateSource
 
@@ -41,6 +42,7 @@ class OperatorWatch:
         lease: who drives.
         target: is let go when the operator is lost.
         pose: is let go when the operator is lost.
+        events: where it is noted that the operator was lost.
         clock: monotonic clock in seconds.
     """
 
@@ -51,21 +53,28 @@ class OperatorWatch:
         lease: Lease,
         target: TargetLeader,
         pose: PoseLeader,
+        events: WebEvents,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._link, self._source, self._lease = link, source, lease
         self._target, self._pose, self._clock = target, pose, clock
+        self._events = events
         self._streams: set[Presence] = set()
 
     def opened(self, caller: Caller) -> Presence:
         """Know a new stream."""
         presence = Presence(caller)
         self._streams.add(presence)
+        words = f"a page was opened, {len(self._streams)} in all"
+        self._events.note("stream_opened", words, session=(caller.session or "")[:6])
         return presence
 
     def closed(self, presence: Presence) -> None:
         """A stream has ended: if it was the operator's and no other of theirs lives, pause."""
         self._streams.discard(presence)
+        words = f"a page was closed, {len(self._streams)} left"
+        session = (presence.caller.session or "")[:6]
+        self._events.note("stream_closed", words, session=session)
         if presence.held_at is not None:
             self._link.hold(False)
         if self._lease.is_held_by(presence.caller) and not self._is_present():
@@ -88,6 +97,7 @@ class OperatorWatch:
     def operator_lost(self, why: str) -> None:
         """Nobody drives any more: let every leader go and ask control to pause."""
         _log.info("pausing: %s", why)
+        self._events.note("operator_lost", f"nobody drives: {why}")
         self._link.request(Request.OPERATOR_LOST)
         self._link.hold(False)
         for presence in self._streams:
@@ -113,7 +123,10 @@ class OperatorWatch:
         expired = self._lease.expire()
         enabled = self._source.safety() == Safety.ENABLED
         beating = [one for one in self._operators() if one.heartbeat_at is not None]
+        self._events.tick()
         if expired is not None:
+            words = f"the lease of {expired.operator} expired: it was not renewed"
+            self._events.note("lease_expired", words, by=expired.operator)
             self.operator_lost(f"the lease of {expired.operator} expired")
         elif enabled and self._lease.holder is None:
             self.operator_lost("nobody holds the lease")

@@ -92,6 +92,8 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(KeyholeError)
     async def _(request: Request, error: KeyholeError) -> Response:
+        # For the door, which notes what was refused.
+        request.scope.setdefault("state", {})["refusal"] = error
         return response(problem_of(error))
 
     @app.exception_handler(RequestValidationError)

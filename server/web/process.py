@@ -20,6 +20,7 @@ import uvicorn
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from robot.errors import KeyholeError
+from server.audit.writer import AuditLog
 from server.control.lifeline import end_with_supervisor
 from server.control.realtime import prefer
 from server.memory.link import WebLink
@@ -87,10 +88,13 @@ def serve(directory: RunDirectory, listener: socket.socket) -> None:
         KeyholeError: the run directory holds no console.
     """
     configuration, console = directory.configuration(), directory.console()
-    access = Access(directory.token(), str(console["host"]))
+    hours = configuration.server.session_hours
+    access = Access(directory.token(), str(console["host"]), hours)
     link = WebLink(directory.path)
+    audit = AuditLog.of_console("web", directory.path)
     scene = SceneServer(configuration, link)
-    app = create_app(configuration, link, access, scene.address, scene.state)
+    app = create_app(configuration, link, access, scene.address, scene.state, audit)
+    scene.on_failure = app.state.services.events.scene_failed
     keep_short(listener)
     config = uvicorn.Config(
         app,
@@ -110,6 +114,7 @@ def serve(directory: RunDirectory, listener: socket.socket) -> None:
     finally:
         scene.stop()
         link.close()
+        audit.close()
 
 
 def main(argv: Sequence[str] | None = None) -> int:

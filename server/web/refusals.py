@@ -19,11 +19,41 @@ class NotAdmitted(WebRefusal):
     code = "not_admitted"
     status = 401
 
+    def __init__(
+        self,
+        detail: str = "this needs the console's token: open the address that `keyhole` printed, "
+        "or send the header `Authorization: Bearer TOKEN`",
+    ) -> None:
+        super().__init__(detail)
+
+
+class WrongToken(NotAdmitted):
+    """The request carries a token that is not this console's, or no longer."""
+
+    code = "wrong_token"
+
     def __init__(self) -> None:
         super().__init__(
-            "this needs the console's token: open the address that `keyhole` printed, "
-            "or send the header `Authorization: Bearer TOKEN`"
+            "this token is wrong or has expired: a console that was started again has a new one; "
+            "take the one that `keyhole` printed at its last start"
         )
+
+
+class SessionExpired(NotAdmitted):
+    """The browser was let in too long ago.
+
+    Attributes:
+        hours: how long a session lasts.
+    """
+
+    code = "session_expired"
+
+    def __init__(self, hours: float) -> None:
+        super().__init__(
+            f"this browser's session has ended after {hours:g} h: open the address that `keyhole` "
+            "printed once more"
+        )
+        self.hours = hours
 
 
 class ForeignOrigin(WebRefusal):
@@ -97,19 +127,65 @@ class LeaseHeld(WebRefusal):
         operator: who holds it.
         offered_to: whom it is offered to, or None.
         expires_in_s: when it ends unless it is renewed.
+        wanted: who wanted it.
     """
 
     code = "lease_held"
     status = 409
 
-    def __init__(self, operator: str, offered_to: str | None, expires_in_s: float) -> None:
+    def __init__(
+        self, operator: str, offered_to: str | None, expires_in_s: float, wanted: str = ""
+    ) -> None:
         if offered_to is None:
             text = f"{operator} is the operator; ask for a hand-over or wait for a release"
         else:
             text = f"{operator} has offered control to {offered_to}"
         super().__init__(text)
-        self.operator, self.offered_to = operator, offered_to
+        self.operator, self.offered_to, self.wanted = operator, offered_to, wanted
         self.expires_in_s = round(expires_in_s, 1)
+
+
+class NobodyToAsk(WebRefusal):
+    """There is no other operator who could be asked for control."""
+
+    code = "nobody_to_ask"
+    status = 409
+
+    def __init__(self) -> None:
+        super().__init__("nobody else drives; take control")
+
+
+class AlreadyAsked(WebRefusal):
+    """Somebody else asks for control already.
+
+    Attributes:
+        operator: who does.
+    """
+
+    code = "already_asked"
+    status = 409
+
+    def __init__(self, operator: str) -> None:
+        super().__init__(f"{operator} asks for control already; wait for the answer")
+        self.operator = operator
+
+
+class HandingOver(WebRefusal):
+    """Nothing moves while control is offered to somebody.
+
+    Attributes:
+        offered_to: to whom.
+    """
+
+    code = "handing_over"
+    status = 409
+
+    def __init__(self, offered_to: str) -> None:
+        super().__init__(
+            f"control is offered to {offered_to}, and nothing moves meanwhile; "
+            "withdraw the offer first"
+        )
+        self.offered_to = offered_to
 
 
 class OutOfRange(WebRefusal):
@@ -163,6 +239,21 @@ class NotReady(WebRefusal):
     def __init__(self, state: str | None, reason: str) -> None:
         super().__init__(reason)
         self.state, self.reason = state, reason
+
+
+class DevicesNotReady(WebRefusal):
+    """The robot's devices are not ready to be enabled.
+
+    Attributes:
+        readiness: a stable word for why.
+    """
+
+    code = "devices_not_ready"
+    status = 409
+
+    def __init__(self, readiness: str, detail: str) -> None:
+        super().__init__(detail)
+        self.readiness = readiness
 
 
 class TrocarRefused(WebRefusal):

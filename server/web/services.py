@@ -11,18 +11,22 @@ from starlette.requests import HTTPConnection
 from starlette.responses import Response
 
 from robot.configuration import Configuration
+from server.audit.writer import AuditLog
 from server.memory.link import WebLink
 from server.memory.recording_link import RecordingLink
 from server.memory.replay_link import ReplayLink
-from server.web.access import Caller
+from server.web.access import Access, Caller
 from server.web.access_guard import caller_of
 from server.web.api_leaders import PoseLeader, TargetLeader
 from server.web.control_requests import ControlRequests
 from server.web.dexterity_source import DexteritySource
+from server.web.events import WebEvents
+from server.web.gamepad_leader import GamepadLeader
 from server.web.lease import Lease
 from server.web.operator_watch import OperatorWatch
 from server.web.recordings import Recordings
 from server.web.state_source import StateSource
+from server.web.stylus_bridge import StylusBridge
 from server.web.trocar_view import TrocarView
 
 
@@ -33,11 +37,15 @@ class Services:
     Attributes:
         configuration: of the robot.
         link: to the control process.
+        access: who may speak.
+        events: what is noted and told.
         lease: who drives.
         source: the newest state.
         requests: to the control process.
         target: the API's standing target.
         pose: the API's clutched leader.
+        stylus: a bridge without ROS.
+        gamepad: at the operator's browser.
         watch: over the operator.
         dexterity: where the tip is.
         trocar: how the shaft stands to the trocar.
@@ -48,11 +56,15 @@ class Services:
 
     configuration: Configuration
     link: WebLink
+    access: Access
+    events: WebEvents
     lease: Lease
     source: StateSource
     requests: ControlRequests
     target: TargetLeader
     pose: PoseLeader
+    stylus: StylusBridge
+    gamepad: GamepadLeader
     watch: OperatorWatch
     dexterity: DexteritySource
     trocar: TrocarView
@@ -66,7 +78,11 @@ class Services:
 
 
 def make_services(
-    configuration: Configuration, link: WebLink, scene: Callable[[], str]
+    configuration: Configuration,
+    link: WebLink,
+    access: Access,
+    audit: AuditLog,
+    scene: Callable[[], str],
 ) -> Services:
     """Put the services together."""
     lease = Lease(configuration.server.lease_seconds)
@@ -76,15 +92,20 @@ def make_services(
     target = TargetLeader(link, source, configuration)
     pose = PoseLeader(link, source, configuration)
     trocar = TrocarView(configuration)
+    events = WebEvents(audit, lease)
     return Services(
         configuration,
         link,
+        access,
+        events,
         lease,
         source,
         ControlRequests(link, source, trocar),
         target,
         pose,
-        OperatorWatch(link, source, lease, target, pose),
+        StylusBridge(link, lease, configuration),
+        GamepadLeader(link, source, configuration),
+        OperatorWatch(link, source, lease, target, pose, events),
         DexteritySource(configuration),
         trocar,
         Recordings(recorder),

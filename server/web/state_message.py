@@ -7,13 +7,14 @@ or no record yet) is null.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hardware.devices import DEVICES
 from robot.configuration import Configuration
 from robot.parameters import parameters
 from robot.priority.levels import CASE_NAMES
@@ -35,6 +36,7 @@ from robot.safety import REASONS, Event
 from scenes.boards.board import BOARD_NAMES, board
 from scenes.trocar_motion import STILL, Breathing
 from server.memory.replay_link import ReplayStatus
+from server.web.devices_view import clearance_view, devices_view, readiness_view
 
 MESSAGE_SCHEMA_VERSION = 1
 
@@ -78,6 +80,7 @@ class Surroundings:
         path_name: name of the path that plays, if one does.
         rate_hz: measured rate of the loop, None while it is not known.
         real_time_factor: plant time over host time, None while it is not known.
+        devices: (1,) DEVICES, what the plant told of its devices last.
         recording: whether records are being written down.
         replay: what is shown of a recording; None where there is a robot.
     """
@@ -93,6 +96,7 @@ class Surroundings:
     path_name: str | None = None
     rate_hz: float | None = None
     real_time_factor: float | None = None
+    devices: NDArray[Any] = field(default_factory=lambda: np.zeros(1, DEVICES))
     recording: bool = False
     replay: ReplayStatus | None = None
 
@@ -104,6 +108,8 @@ class OperatorView:
     name: str | None = None
     you: bool = False
     expires_in_s: float | None = None
+    offered_to: str | None = None
+    asked_by: str | None = None
 
 
 def _round(value: float, digits: int) -> float | None:
@@ -212,9 +218,13 @@ class StateMessages:
                 "expires_in_s": None
                 if operator.expires_in_s is None
                 else round(operator.expires_in_s, 2),
+                "offered_to": operator.offered_to,
+                "asked_by": operator.asked_by,
             },
             "plant": around.plant,
             **self._robot_of(around),
+            "readiness": readiness_view(int(known[0]["input"]["readiness"])),
+            "devices": devices_view(around.devices, self._configuration.hardware.connected),
             "recording": around.recording,
             "replay": None if around.replay is None else replay_view(around.replay),
             "control": around.control,
@@ -244,6 +254,7 @@ class StateMessages:
             "true": _pose(truth["position"], truth["wxyz"]),
             "trocar_mm": _millimetres(tick_input["trocar_position"]),
             "trocar": _trocar(around),
+            "clearance": clearance_view(state, self._limits.clearance_mm * 1e-3),
             "compensation": COMPENSATIONS[
                 Compensation(int(tick_input["settings"]["compensation"]))
             ],

@@ -9,6 +9,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from server.web.device_schema import ClearancePart, DevicesPart, ReadinessPart
+
 Millimetres = list[float | None]
 
 
@@ -33,6 +35,8 @@ class OperatorPart(Part):
     name: str | None
     you: bool
     expires_in_s: float | None
+    offered_to: str | None = Field(description="To whom control is offered.")
+    asked_by: str | None = Field(description="Who asks for control.")
 
 
 class PriorityPart(Part):
@@ -169,7 +173,7 @@ class StateMessage(Part):
     safety: SafetyPart
     operator: OperatorPart
     engaged: bool
-    leader: Literal["none", "gizmo", "api_pose", "api_target", "path"]
+    leader: Literal["none", "gizmo", "api_pose", "api_target", "path", "stylus", "gamepad"]
     hold: bool
     priority: PriorityPart
     teleoperation: TeleoperationPart
@@ -186,6 +190,7 @@ class StateMessage(Part):
     true: PosePart
     trocar_mm: Millimetres = Field(min_length=3, max_length=3)
     trocar: TrocarPart
+    clearance: ClearancePart
     compensation: Literal["off", "gain", "full"]
     tracker: TrackerPart
     tension_n: list[float | None] = Field(min_length=4, max_length=4)
@@ -200,6 +205,8 @@ class StateMessage(Part):
     preset: str | None = Field(description="Of the simulated robot; null for the kinematic one.")
     seed: int | None = Field(description="Likewise.")
     board: str = Field(description="Name of the board before the instrument.")
+    readiness: ReadinessPart
+    devices: DevicesPart
     recording: bool
     replay: ReplayPart | None = Field(description="Null where there is a robot.")
     control: Literal["running", "starting", "down"]

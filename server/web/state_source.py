@@ -8,8 +8,10 @@ from collections.abc import Callable
 from typing import Any
 
 import msgspec
+import numpy as np
 from numpy.typing import NDArray
 
+from hardware.devices import DEVICES
 from robot.configuration import Configuration
 from robot.records import Safety
 from server.memory.link import WebLink
@@ -87,6 +89,7 @@ class StateSource:
         self._messages = StateMessages(configuration)
         self._meter = LoopMeter()
         self._status: dict[str, Any] = {}
+        self._devices = np.zeros(1, DEVICES)
         self._status_at = -_STATUS_NS
         self._texts: dict[bool, tuple[int, str]] = {}
         self.newest_tick = 0
@@ -145,7 +148,14 @@ class StateSource:
     def _message(self, you: bool) -> dict[str, Any]:
         record = self.record()
         holder = self._lease.holder
-        operator = OperatorView(holder.operator if holder else None, you, self._lease.expires_in_s)
+        wish = self._lease.wish
+        operator = OperatorView(
+            holder.operator if holder else None,
+            you,
+            self._lease.expires_in_s,
+            self._lease.offered_to,
+            wish.operator if wish else None,
+        )
         return self._messages.message(record, self._surroundings(record), operator)
 
     def status(self) -> dict[str, Any]:
@@ -153,6 +163,7 @@ class StateSource:
         now = self._clock_ns()
         if now - self._status_at >= _STATUS_NS:
             self._status, self._status_at = self._link.status(), now
+            self._devices = self._link.devices()
             self._records = self._recorder is not None and self._recorder.status().records
         return self._status
 
@@ -180,6 +191,7 @@ class StateSource:
             path_name=self._path_name(path_id),
             rate_hz=rate_hz,
             real_time_factor=factor,
+            devices=self._devices,
             recording=self._records,
             replay=None if self._replay is None else self._replay.status(),
         )

@@ -22,16 +22,23 @@ from server.web.access_guard import caller_of
 from server.web.api_models import Body, Flag, LeaderPose
 from server.web.api_motion import pass_on
 from server.web.api_robot import ROBOT
+from server.web.events import Asked
 from server.web.operator_watch import Presence
 from server.web.problems import problem_of
-from server.web.refusals import UnreadableRequest
+from server.web.refusals import NotTheOperator, UnreadableRequest
 from server.web.services import Services, services_of
 
 LARGEST_MESSAGE = 4096
 UNSHOWN_S = 1.0
 """A client that tells what it has shown gets nothing new while it is this far behind."""
 
-_PROBLEMS_KEPT = 4
+WARNED_S = 600.0
+"""So long before its session ends a page is told."""
+
+_PROBLEMS_KEPT = 8
+
+
+Deflection = Annotated[float, Field(strict=True, ge=-1, le=1, allow_inf_nan=False)]
 
 
 class Heartbeat(Body):
@@ -62,13 +69,28 @@ class EmergencyStop(Body):
     type: Literal["emergency-stop"]
 
 
+class PageError(Body):
+    """A part of the page failed, which is told in its place."""
+
+    type: Literal["page-error"]
+    words: Annotated[str, Field(max_length=300)]
+
+
 class LeaderMessage(LeaderPose):
     """One sample of a leader, as POST leader takes it."""
 
     type: Literal["leader"]
 
 
-Incoming = Heartbeat | Hold | Renew | EmergencyStop | LeaderMessage
+class GamepadMessage(Body):
+    """What a gamepad says: rates right, up, toward the operator, and turns about those axes."""
+
+    type: Literal["gamepad"]
+    axes: tuple[Deflection, Deflection, Deflection, Deflection, Deflection, Deflection]
+    buttons: Annotated[int, Field(strict=True, ge=0, le=3)]
+
+
+Incoming = Heartbeat | Hold | Renew | EmergencyStop | PageError | LeaderMessage | GamepadMessage
 _incoming: TypeAdapter[Incoming] = TypeAdapter(Annotated[Incoming, Field(discriminator="type")])
 router = APIRouter()
 
@@ -131,6 +153,9 @@ class StreamClient:
         self._caller = caller_of(websocket.scope)
         self._progress = Progress()
         self._problems: deque[Any] = deque(maxlen=_PROBLEMS_KEPT)
+        self._told, staying = services.events.notices.staying()
+        self._problems.extend(msgspec.json.encode(one.message()).decode() for one in staying)
+        self._warned = False
 
     async def run(self) -> None:
         """Serve until the client goes."""
@@ -151,8 +176,9 @@ class StreamClient:
 
     async def _send(self) -> None:
         deadline = time.monotonic()
-        while True:
+        while not self._is_over():
             now = time.monotonic()
+            self._take_notices()
             if not self._progress.is_behind(now):
                 text = self._services.source.text(self._caller)
                 self._progress.sent(self._services.source.newest_tick, now)
@@ -165,6 +191,24 @@ class StreamClient:
                 deadline = time.monotonic() + self._period_s
             await asyncio.sleep(deadline - time.monotonic())
 
+    def _is_over(self) -> bool:
+        """Whether the session behind this stream has ended; warns some minutes before."""
+        left_s = self._services.access.left_s(self._caller)
+        if left_s < WARNED_S and not self._warned:
+            self._warned = True
+            words = (
+                f"This browser's session ends in {max(0.0, left_s) / 60.0:.0f} min: open the "
+                "address that keyhole printed once more to stay."
+            )
+            notice = {"type": "notice", "kind": "trouble", "text": words}
+            self._problems.append(msgspec.json.encode(notice).decode())
+        return left_s <= 0.0
+
+    def _take_notices(self) -> None:
+        you = self._services.lease.is_held_by(self._caller)
+        self._told, new = self._services.events.notices.since(self._told, you)
+        self._problems.extend(msgspec.json.encode(one.message()).decode() for one in new)
+
     async def _receive(self, presence: Presence) -> None:
         while True:
             message = await self._websocket.receive()
@@ -173,14 +217,24 @@ class StreamClient:
             try:
                 self._take(read_message(message.get("text") or ""), presence)
             except KeyholeError as refusal:
+                self._note(refusal)
                 document = {"type": "problem", "problem": problem_of(refusal)}
                 self._problems.append(msgspec.json.encode(document).decode())
+
+    def _note(self, refusal: KeyholeError) -> None:
+        if isinstance(refusal, NotTheOperator):
+            address = self._websocket.client.host if self._websocket.client else "unknown"
+            asked = Asked("POST", f"{ROBOT}/leader", address, self._caller)
+            self._services.events.refused(asked, refusal)
 
     def _take(self, message: Incoming, presence: Presence) -> None:
         services = self._services
         match message:
             case EmergencyStop():
                 services.link.emergency_stop()
+                by = services.events.who(self._caller, "its page")
+                words = f"{by}: press the emergency stop (stream)"
+                services.events.note("emergency_stop", words, by=by)
             case Heartbeat():
                 services.watch.heartbeat(presence)
                 self._progress.shown(message.tick)
@@ -188,6 +242,11 @@ class StreamClient:
                 services.watch.hold(presence, message.down)
             case Renew():
                 services.lease.renew(self._caller)
+            case PageError():
+                services.events.page_failed(self._caller, message.words)
+            case GamepadMessage():
+                services.lease.check(self._caller)
+                services.gamepad.sample(message.axes, message.buttons)
             case LeaderMessage():
                 services.lease.check(self._caller)
                 pass_on(message, services)

@@ -84,10 +84,15 @@ def _is_pose(message: TransformControlsUpdateMessage) -> bool:
 
 
 class ViserFilter:
-    """Decides on the messages of one browser, in their order."""
+    """Decides on the messages of one browser, in their order.
+
+    Attributes:
+        refused_drags: how often somebody took a gizmo who may not.
+    """
 
     def __init__(self) -> None:
         self._dragged: dict[str, TransformControlsDragEndMessage] = {}
+        self.refused_drags = 0
 
     def passes(self, frame: bytes, is_operator: bool) -> bool:
         """Whether ``frame`` may go on to viser.
@@ -107,6 +112,8 @@ class ViserFilter:
                 if is_operator:
                     end = TransformControlsDragEndMessage(message.name, message.owner)
                     self._dragged[message.name] = end
+                else:
+                    self.refused_drags += 1
                 return is_operator
             case TransformControlsUpdateMessage():
                 return is_operator and _is_pose(message)

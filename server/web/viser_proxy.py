@@ -25,6 +25,9 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
 from server.web.access_guard import caller_of
+from server.web.acts import DRAG
+from server.web.events import Asked
+from server.web.refusals import NotTheOperator
 from server.web.services import Services, services_of
 from server.web.viser_guard import SECRET_HEADER
 from server.web.viser_messages import ViserFilter
@@ -85,7 +88,8 @@ class _Upward:
         self, upstream: ClientConnection, websocket: WebSocket, services: Services
     ) -> None:
         self._upstream, self._websocket = upstream, websocket
-        self._lease, self._caller = services.lease, caller_of(websocket.scope)
+        self._services, self._lease = services, services.lease
+        self._caller = caller_of(websocket.scope)
         self._filter = ViserFilter()
 
     async def pass_on(self) -> None:
@@ -97,10 +101,19 @@ class _Upward:
             frame = message.get("bytes")
             if frame and self._filter.passes(frame, self._lease.is_held_by(self._caller)):
                 await self._upstream.send(frame)
+            if self._filter.refused_drags:
+                self._note_drag()
+
+    def _note_drag(self) -> None:
+        self._filter.refused_drags = 0
+        address = self._websocket.client.host if self._websocket.client else "unknown"
+        holder = self._lease.holder
+        refusal = NotTheOperator(holder.operator if holder else None)
+        self._services.events.refused(Asked("POST", DRAG, address, self._caller), refusal)
 
     async def end_lost_drags(self) -> None:
-        """Let go what the browser drags when it loses the lease."""
-        while True:
+        """Let go what the browser drags when it loses the lease; end with its session."""
+        while self._services.access.left_s(self._caller) > 0.0:
             await asyncio.sleep(_LEASE_WATCH_S)
             if not self._lease.is_held_by(self._caller):
                 for frame in self._filter.ends_of_drags():

@@ -318,7 +318,7 @@ def test_a_released_lease_pauses(driver: ApiClient) -> None:
     driver.forget_lease()
     state = driver.until(lambda s: s["safety"]["state"] == "PAUSED", "a release pauses")
     assert state["safety"]["reason_code"] == "operator_lost"
-    assert state["operator"] == {"name": None, "you": False, "expires_in_s": None}
+    assert set(state["operator"].values()) == {None, False}
 
 
 def test_an_expired_lease_pauses_and_stops_the_path(driver: ApiClient, watcher: ApiClient) -> None:
