@@ -21,6 +21,8 @@ from hardware.fake_servos.wire import Wire
 from hardware.servos.control_table import HardwareError
 
 _IDLE_S, _BUSY_S = 0.25, 0.02
+_BEHIND_NS = 10_000_000
+"""How far the motion may be behind the clock while nobody asks for it."""
 _ROWS = 5000
 _HOT_CELSIUS, _LOW_VOLT = 80.0, 5.0
 _PRIORITY = 40
@@ -114,7 +116,8 @@ class Program:
                 self.control.serve(descriptor)
         self._send_due()
         now_ns = time.monotonic_ns()
-        self.simulation.advance(now_ns)
+        if now_ns - self.simulation.now_ns > _BEHIND_NS:
+            self.simulation.advance(now_ns)
         for fault in self.faults.expired(now_ns):
             self._clear(fault)
         if self._plug_ns and now_ns >= self._plug_ns:

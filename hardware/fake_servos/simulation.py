@@ -14,7 +14,7 @@ from hardware.fake_servos.tendons import Segment, SegmentShape
 from hardware.servos.control_table import CENTRE_TICK, TICKS_PER_TURN
 
 TENDONS = 4
-_STEP_NS = 1_000_000
+_STEP_NS, _SMALLEST_STEP_NS = 1_000_000, 250_000
 _RAD_PER_TICK = 2.0 * math.pi / TICKS_PER_TURN
 _KEPT = 60_000
 """Samples of the true motion that are remembered: a minute of moving without rest."""
@@ -104,8 +104,8 @@ class Simulation:
         self._still = False
 
     def advance(self, to_ns: int) -> None:
-        """Go on until ``to_ns``; going back is ignored."""
-        while self._now_ns < to_ns:
+        """Go on until ``to_ns``, or a quarter of a millisecond less; going back is ignored."""
+        while to_ns - self._now_ns >= _SMALLEST_STEP_NS:
             if self._still and not self._wakes(to_ns):
                 self._now_ns = to_ns
                 return
