@@ -80,7 +80,7 @@ class StylusLeader:
         now_ns = time.monotonic_ns()
         self._view.update(now_ns)
         if self.stylus.publish(now_ns, self._view.enabled):
-            self._report.saw(self.stylus)
+            self._report.saw(self.stylus, now_ns)
             self._push_back(now_ns)
         elif now_ns - self._forced_ns > _REPEAT_ZERO_NS:
             self._push_back(now_ns)

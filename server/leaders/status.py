@@ -42,9 +42,13 @@ class StylusReport:
         self._seen: deque[tuple[int, int]] = deque()
         self._largest_delay_ns = 0
 
-    def saw(self, stylus: StylusInput) -> None:
+    def saw(self, stylus: StylusInput, now_ns: int) -> None:
         """A batch of samples was taken in."""
         self._largest_delay_ns = max(self._largest_delay_ns, stylus.delay_ns)
+        if not self._seen or now_ns - self._seen[-1][0] >= SAY_NS:
+            self._seen.append((now_ns, stylus.counts.samples))
+        while now_ns - self._seen[0][0] > _WINDOW_NS:
+            self._seen.popleft()
 
     def fill(
         self,
@@ -56,12 +60,10 @@ class StylusReport:
         now_ns: int,
     ) -> NDArray[Any]:
         """The record, (1,), filled with what holds now."""
-        seen, record = self._seen, self.record[0]
-        seen.append((now_ns, stylus.counts.samples))
-        while now_ns - seen[0][0] > _WINDOW_NS:
-            seen.popleft()
-        elapsed = (seen[-1][0] - seen[0][0]) * 1e-9
-        record["rate_hz"] = (seen[-1][1] - seen[0][1]) / elapsed if elapsed else 0.0
+        self.saw(stylus, now_ns)
+        record, (since_ns, before) = self.record[0], self._seen[0]
+        elapsed = (now_ns - since_ns) * 1e-9
+        record["rate_hz"] = (stylus.counts.samples - before) / elapsed if elapsed > 0.0 else 0.0
         record["connected"], record["stamp_ns"] = int(connected), now_ns
         record["sample_ns"], record["delay_ns"] = stylus.sample_ns, self._largest_delay_ns
         self._largest_delay_ns = 0

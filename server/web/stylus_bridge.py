@@ -146,7 +146,7 @@ class StylusBridge:
         )
         self._view.update(now_ns)
         stylus.publish(now_ns, self._view.enabled)
-        self._report.saw(stylus)
+        self._report.saw(stylus, now_ns)
         self._heard_ns, self._message = now_ns, ""
         return sample
 
