@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from hardware.module.preparation import HELD_TICKS
 from hardware.module.transmission import Transmission
 from robot.records import SERVOS
 
@@ -13,8 +14,6 @@ STALE_NS = 25_000_000
 
 _NEAR_RAD = math.radians(5.0)
 """How far a new motion may begin from where the servos hold: what friction and load leave open."""
-_HOLD_RAD = math.radians(1.5)
-"""A goal nearer to the servo than this is kept by a hold, as it carries the tendon's load."""
 
 
 class Follower:
@@ -27,26 +26,26 @@ class Follower:
         goals: ticks, what is written next.
         holding: whether commands are ignored.
         stale: whether the newest command of a motion has become too old.
+        refusing: whether a motion is ignored that does not begin where the servos are.
     """
 
     def __init__(self, transmission: Transmission, speed_rad_s: float) -> None:
         """Turn no faster than ``speed_rad_s``."""
         self.goals = [0] * SERVOS
         self.holding = True
-        self.stale = False
+        self.stale = self.refusing = False
         self._transmission = transmission
         self._speed = speed_rad_s * transmission.ticks_per_rad
         self._near = _NEAR_RAD * transmission.ticks_per_rad
-        self._keep = _HOLD_RAD * transmission.ticks_per_rad
         self._rested = False
         self._exact = [0.0] * SERVOS
         self._wanted = [0.0] * SERVOS
 
     def hold(self, position: Sequence[int]) -> None:
         """Stop here: at the goals that are reached but for the load, else at ``position``."""
-        self.holding, self._rested = True, False
+        self.holding, self._rested, self.refusing = True, False, False
         for index, tick in enumerate(position):
-            if abs(self.goals[index] - tick) > self._keep:
+            if abs(self.goals[index] - tick) > HELD_TICKS:
                 self.goals[index] = tick
             self._exact[index] = self.goals[index]
 
@@ -67,7 +66,7 @@ class Follower:
         """
         self.stale = moving and age_ns > STALE_NS
         if not moving:
-            self._rested = True
+            self._rested, self.refusing = True, False
             return
         if self.stale:
             return
@@ -75,7 +74,8 @@ class Follower:
         self._transmission.ticks(angles, wanted)
         if self.holding:
             far = max(abs(a - b) for a, b in zip(wanted, exact, strict=True))
-            if not self._rested or far > self._near:
+            self.refusing = self._rested and far > self._near
+            if not self._rested or self.refusing:
                 return
             self.holding = False
         step = self._speed * dt_s

@@ -33,8 +33,8 @@ from robot.configuration import Configuration
 from robot.records import SERVOS, Readiness
 from robot.safety import Event
 
-_PATIENCE_S = 0.006
-"""How late an answer may be: two misses must be found out within the 25 ms of stylus and API."""
+_PATIENCE_S, _PATIENCE_PERIODS = 0.006, 1.5
+"""How late an answer may be. At 250 Hz two misses are found out within the 25 ms of the stylus."""
 _RESERVE = 1.3
 """How much faster than commands may be the goals may catch up."""
 _STATUS_EVERY_S = 0.05
@@ -42,6 +42,8 @@ _STATUS_EVERY_S = 0.05
 _LASTS_NS = 500_000_000
 """How long an event is told at least: nobody overlooks it, and it does not flicker."""
 _TOLERANCE_RAD = math.radians(3.0)
+_SLACK_RAD = math.radians(3.0)
+"""Servos that turned so far without torque have let their tendons go."""
 _LOAD_SHARE = 0.01 * TABLE["present_load"].unit_scale
 
 
@@ -78,10 +80,12 @@ class ModuleServos:
         self.homing: Homing | None = None
         self.stamps_ns = [0] * SERVOS
         self._period_s = 1.0 / self.settings.rate_hz
+        self._slack = _SLACK_RAD * self.transmission.ticks_per_rad
+        self._patience_s = max(_PATIENCE_S, _PATIENCE_PERIODS * self._period_s)
         self._limit = (
             self.transmission.half_range + _TOLERANCE_RAD * self.transmission.ticks_per_rad
         )
-        self._released = False
+        self._released = self._silent = False
         self._until_ns = 0
         self._last_ns = 0
         self._gap_ns = round(0.75e6 * self.settings.watchdog_ms)
@@ -100,7 +104,7 @@ class ModuleServos:
         self._bus = bus
         known = self.prepared is not None
         self.prepared = prepare(bus, self.settings)
-        self.cycle = CyclicExchange(bus, self.settings.ids, self.prepared.fast, _PATIENCE_S)
+        self.cycle = CyclicExchange(bus, self.settings.ids, self.prepared.fast, self._patience_s)
         for index, status in enumerate(self.prepared.status):
             self._note(index, status)
         if not (all(self.torque) or self._released):
@@ -109,7 +113,7 @@ class ModuleServos:
             self.homed = False
         elif known and self.homed:
             self.message = "connected again; enable to go on"
-        self.follower.take(self.prepared.position)
+        self.follower.take(self.prepared.goals)
         self.follower.hold(self.prepared.position)
         self.cycle.position[:] = self.prepared.position
         self.watch.forget(self.cycle, self.follower.goals)
@@ -119,6 +123,7 @@ class ModuleServos:
 
     def disconnect(self) -> None:
         """The port is gone; the servos stop by their watchdogs."""
+        self._silent = False
         self.cycle = None
         self.homing = None
         self.follower.holding = True
@@ -146,23 +151,25 @@ class ModuleServos:
         now_ns = time.monotonic_ns()
         passed_ns = now_ns - self._last_ns
         self._last_ns = now_ns
-        if self.homing is None:
+        if self.homing is None and self.homed and not self.event:
             dt_s = min(passed_ns * 1e-9, 2.0 * self._period_s)
             follower.follow(angles, moving, age_ns, dt_s)
         answered = cycle.exchange(follower.goals)
         now_ns = time.monotonic_ns()
-        was_silent = self.event == Event.SERVO_SILENT
         for index in range(SERVOS):
             if answered >> index & 1:
                 self.stamps_ns[index] = now_ns
         self.watch.look(answered, cycle, follower.goals)
         if passed_ns > self._gap_ns:
             self._after_a_gap()
-        elif was_silent and answered == ALL and not self.watch.event:
+        elif self._silent and answered == ALL:
+            self._silent = False
             self._begin_anew(Event.SERVO_SILENT, "a servo was silent and answers again")
         else:
             self._look_deeper()
         self._decide(now_ns)
+        if follower.refusing and not self.event:
+            self.message = "the motion does not begin where the servos are; disable, then enable"
         if self.homing is not None and answered == ALL:
             self._home_on(cycle)
         return answered == ALL
@@ -170,6 +177,7 @@ class ModuleServos:
     def _decide(self, now_ns: int) -> None:
         """Tell the watch's event, and hold when there is one."""
         if self.watch.event:
+            self._silent = self._silent or self.watch.event == Event.SERVO_SILENT
             self._tell(self.watch.event, self.watch.message, now_ns)
         elif any(self.errors):
             index = next(index for index in range(SERVOS) if self.errors[index])
@@ -254,10 +262,15 @@ class ModuleServos:
 
     def take_hold(self) -> None:
         """Put torque on where they stand."""
+        goals = list(self.follower.goals)
         torque_on(self._bus, self.settings.ids)
         self._released = False
         self.message = ""
         self._begin(self._bus)
+        moved = max(abs(a - b) for a, b in zip(goals, self.follower.goals, strict=True))
+        if self.homed and moved > self._slack:
+            self.homed = False
+            self.message = "the tendons went slack without torque; home"
 
     def _begin(self, bus: ServoBus) -> None:
         message = self.message

@@ -44,6 +44,10 @@ _EEPROM = {
 _SILENT_LEVEL = TABLE["status_return_level"]
 _VELOCITY_UNIT_DEG_S = TABLE["profile_velocity"].unit_scale * 6.0
 _STATUS = (TABLE["torque_enable"].address, TABLE["bus_watchdog"].end)
+HELD_TICKS = 17
+"""A goal no further than this (1.5 degrees) from where its servo stands is one that is held: what
+lies between carries the tendon's load."""
+
 _RELEASE_TIMES = 3
 _BOOT_S = 3.0
 
@@ -68,13 +72,15 @@ class Prepared(NamedTuple):
     Attributes:
         found: who they are, in the order of the tendons.
         status: likewise, before anything was changed.
-        position: ticks where they stand, which are their goals now.
+        position: ticks where they stand.
+        goals: ticks that they were told, so that they stay there.
         fast: whether they know the fast sync read.
     """
 
     found: tuple[Found, ...]
     status: tuple[ServoStatus, ...]
     position: tuple[int, ...]
+    goals: tuple[int, ...]
     fast: bool
 
 
@@ -126,12 +132,21 @@ def prepare(bus: ServoBus, settings: Servos) -> Prepared:
         bus.write(servo, "profile_acceleration", 0)
         bus.write(servo, "profile_velocity", velocity)
     position = tuple(bus.read(servo, "present_position") for servo in ids)
-    for servo, tick, state in zip(ids, position, status, strict=True):
+    goals = tuple(_resting_goal(bus, *each) for each in zip(ids, position, status, strict=True))
+    for servo, goal, state in zip(ids, goals, status, strict=True):
         if not state.error:
-            bus.write(servo, "goal_position", min(max(tick, 0), TICKS_PER_TURN - 1))
+            bus.write(servo, "goal_position", goal)
     size = PRESENT[1] - PRESENT[0]
     fast = len(bus.fast_sync_read(PRESENT[0], size, ids)) == len(ids)
-    return Prepared(found, status, position, fast)
+    return Prepared(found, status, position, goals, fast)
+
+
+def _resting_goal(bus: ServoBus, servo: int, position: int, status: ServoStatus) -> int:
+    """A goal that leaves the servo where it is, with the load that it carries there."""
+    goal = bus.read(servo, "goal_position") if status.torque else position
+    if abs(goal - position) > HELD_TICKS:
+        goal = position
+    return min(max(goal, 0), TICKS_PER_TURN - 1)
 
 
 def _write_eeprom(bus: ServoBus, servo: int, torque: bool) -> None:

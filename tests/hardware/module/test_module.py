@@ -1,0 +1,123 @@
+"""The instrument module against simulated servos: homing, following, holding, letting go."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from hardware.devices import DeviceState
+from robot.records import Readiness
+from tests.hardware.module.bench import IDS, Bench, bench
+
+
+@pytest.fixture(scope="module")
+def shared() -> Iterator[Bench]:
+    with bench() as made:
+        made.until(lambda reading: reading.readiness == Readiness.NOT_HOMED)
+        made.ready()
+        yield made
+
+
+@pytest.fixture
+def homed(shared: Bench) -> Bench:
+    shared.ready()
+    return shared
+
+
+def test_homing_leaves_every_tendon_taut_and_the_segment_nearly_straight(homed: Bench) -> None:
+    state = homed.servos.state()
+    assert min(state["tensions_n"]) > 10.0
+    # Unequal slack of the tendons is all that bends it.
+    assert max(abs(bend) for bend in state["bend_rad"]) < math.radians(12.0)
+    homed.read()
+    assert np.all(homed.loads < -0.05)
+    assert np.all(np.abs(homed.angles) < math.radians(3.0))
+
+
+def test_a_motion_is_followed_and_bends_the_segment_the_right_way(homed: Bench) -> None:
+    before = homed.servos.state()["bend_rad"]
+    homed.drive_to((-0.3, 0.0, 0.3, 0.0))
+    after = homed.servos.state()["bend_rad"]
+    # A pulled first tendon bends toward +u; the tendons' share is pulley over pitch radius.
+    assert after[0] - before[0] > 0.5
+    assert abs(after[1] - before[1]) < 0.1
+
+
+def test_what_is_not_a_motion_is_not_followed(homed: Bench) -> None:
+    goals = homed.goals()
+    homed.command[:] += 0.2
+    homed.rest(0.2)
+    assert homed.goals() == goals
+
+
+def test_a_motion_that_does_not_begin_where_the_servos_are_is_not_followed(homed: Bench) -> None:
+    homed.module.hold()
+    homed.rest()
+    goals = homed.goals()
+    homed.command[:] += 0.2
+    for _ in range(30):
+        homed.module.write(homed.command, True)
+        homed.servos.state()
+    assert homed.goals() == goals
+    assert "does not begin where the servos are" in homed.message
+
+
+def test_hold_stops_and_ignores_the_motion_that_goes_on(homed: Bench) -> None:
+    homed.drive_to((0.1, 0.0, -0.1, 0.0))
+    homed.module.hold()
+    for _ in range(30):
+        homed.module.write(homed.command, True)
+        homed.servos.state()
+    goals = homed.goals()
+    homed.command[:] += 0.3
+    for _ in range(30):
+        homed.module.write(homed.command, True)
+        homed.servos.state()
+    assert homed.goals() == goals
+
+
+def test_release_lets_go_and_who_takes_hold_again_must_home(homed: Bench) -> None:
+    homed.module.release()
+    homed.until(lambda reading: reading.readiness == Readiness.TORQUE_OFF)
+    assert not any(servo["torque"] for servo in homed.servos.state()["servos"])
+    homed.rest(0.3)
+    homed.module.take_hold()
+    # Tendons under pretension turn their servos back: without it the zero means nothing.
+    homed.until(lambda reading: reading.readiness == Readiness.NOT_HOMED)
+    assert all(servo["torque"] for servo in homed.servos.state()["servos"])
+    assert "slack" in homed.message
+
+
+def test_people_are_told_about_the_bus(homed: Bench) -> None:
+    homed.until(lambda _: homed.devices()["rate_hz"] > 0.0)
+    bus = homed.devices()
+    assert bus["state"] == DeviceState.CONNECTED
+    assert bus["homed"] == 1
+    assert tuple(bus["servos"]["id"]) == IDS
+    assert set(bus["servos"]["model"]) == {1060}
+    assert all(bus["servos"]["answers"])
+    assert all(abs(bus["servos"]["voltage_v"] - 12.0) < 1.0)
+    assert 0.0 < bus["cycle_median_ms"] <= bus["cycle_p99_ms"]
+    assert 0.0 < bus["cpu_percent"] < 100.0
+    assert bus["port"].decode().endswith("ttyFAKE0")
+
+
+def test_a_wrong_sign_is_found_at_homing() -> None:
+    with bench("--faults", "reversed:servo=102") as made:
+        made.until(lambda reading: reading.readiness == Readiness.NOT_HOMED)
+        made.module.home()
+        made.until(lambda reading: reading.readiness == Readiness.BUSY)
+        made.until(lambda reading: reading.readiness == Readiness.NOT_HOMED)
+        assert made.message.startswith("servo 102: turns the wrong way")
+
+
+def test_servos_of_the_factory_are_set_up_without_touching_their_torque() -> None:
+    with bench("--return-delay-us", "500") as made:
+        made.until(lambda reading: reading.readiness == Readiness.NOT_HOMED)
+        state = made.servos.state()["servos"]
+        assert not any(servo["torque"] for servo in state)
+        assert {servo["operating_mode"] for servo in state} == {3}
+        assert {servo["bus_watchdog"] for servo in state} == {20}
