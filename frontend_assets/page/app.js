@@ -3,6 +3,7 @@
 import { call, ROBOT } from "/assets/api.js";
 import { Boards } from "/assets/boards.js";
 import { byId, setText } from "/assets/dom.js";
+import { GamepadLeader } from "/assets/gamepad.js";
 import { startKeys } from "/assets/keys.js";
 import { Motion } from "/assets/motion.js";
 import { refuse, showBanner, showLink } from "/assets/notices.js";
@@ -14,6 +15,7 @@ import { Recording } from "/assets/recording.js";
 import { Replay } from "/assets/replay.js";
 import { Settings } from "/assets/settings.js";
 import { StateStream } from "/assets/stream.js";
+import { startStylus } from "/assets/stylus.js";
 import { showTask } from "/assets/task.js";
 import { switchTheme } from "/assets/theme.js";
 import { startTooltips } from "/assets/tooltips.js";
@@ -23,7 +25,7 @@ import { Trocar } from "/assets/trocar.js";
 
 const SHOW_MS = 100;
 const LATE_S = 1;
-const LEADERS = { none: "none", gizmo: "gizmo", api_pose: "API, relative pose", api_target: "API, target pose", path: "path" };
+const LEADERS = { none: "none", gizmo: "gizmo", api_pose: "API, relative pose", api_target: "API, target pose", path: "path", stylus: "stylus", gamepad: "gamepad" };
 
 window.keyhole = { state: null };
 
@@ -129,6 +131,8 @@ startKeys({
   holdsToMove: () => window.keyhole.state?.teleoperation.hold_to_move === true,
   refuse,
 });
+new GamepadLeader(stream, refuse);
+startStylus(() => stream.up && !window.keyhole.state?.replay);
 stream.connect();
 // A silent link must show its age although no message arrives.
 setInterval(() => performance.now() - shown > 2 * SHOW_MS && show(), 2 * SHOW_MS);
