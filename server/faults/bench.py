@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import signal
 import time
@@ -14,22 +15,27 @@ from typing import Self
 import numpy as np
 
 from benchmarks.console import Console
-from hardware.fake_servos.client import FakeServosProcess
+from hardware.devices import DEVICES
+from hardware.fake_servos.client import FakeServos, FakeServosProcess
 from robot.configuration import Configuration
-from robot.records import Request, Safety
+from robot.records import Readiness, Safety
 from robot.safety import REASONS, Event
 from server.faults.access import Answer, Api
 from server.faults.fault import BenchFailed, Deadline
 from server.faults.leading import Circle, StreamLeader
+from server.faults.stylus import StylusProcess
 from server.faults.watching import Records, Watch, commanded_path_mm, reason, safety
-from server.memory.link_records import SUPERVISION, SUPERVISION_FILE
+from server.memory.link_records import DEVICES_FILE, SUPERVISION, SUPERVISION_FILE
 from server.memory.mapped import MappedReadError, MappedSlot
+from server.memory.stylus_records import STYLUS_STATUS, STYLUS_STATUS_FILE
 from server.supervision.child_process import module_environment
 
-_ARM_S = 20.0
+_ARM_S, _RECOVER_S = 25.0, 60.0
+_REPLY_MS = 4.0
+_PATIENCE = "wait"
+_GO_HOME_S, _AT_HOME_MM, _TURN_RAD = 3.0, 0.5, 1.4
 _UNDER_WAY_MM = 1.0
 _LOOK_S = 0.02
-_HOMING_S = 60.0
 WATCHDOG_MS, HANG_UP_MS, WEB_SILENT_MS, HUNG_MS = 60.0, 100.0, 1100.0, 6000.0
 
 
@@ -43,8 +49,9 @@ class Bench:
         sitecustomize: a folder that goes before all others on the processes' module path.
 
     Attributes:
-        console: the processes. api: the operator's. leader: drives. watch: sees every record.
-        servos: the simulated servo bus; None without one.
+        console: the processes. api: the operator's. watch: sees every record.
+        page: the operator's; it leads where there is no stylus.
+        servos, stylus: control channels of the simulated bus and stylus; None without them.
     """
 
     def __init__(
@@ -56,7 +63,8 @@ class Bench:
         sitecustomize: Path | None = None,
     ) -> None:
         self.folder, self.configuration, self.hardware = folder, configuration, hardware
-        self.servos: FakeServosProcess | None = None
+        self.servos: FakeServos | None = None
+        self.stylus: FakeServos | None = None
         self._environment = {"XDG_DATA_HOME": str(folder / "data")}
         if sitecustomize is not None:
             known = module_environment().get("PYTHONPATH", "")
@@ -73,8 +81,11 @@ class Bench:
             if self.hardware:
                 link = folder / "servos"
                 baud = str(self.configuration.servos.baud_rate)
-                self.servos = stack.enter_context(FakeServosProcess(link, "--baud", baud))
+                self.servos = stack.enter_context(FakeServosProcess(link, "--baud", baud)).servos
+                stylus = stack.enter_context(StylusProcess(folder))
+                self.stylus = stylus.channel
                 arguments = ("--robot", "hardware", "--servos", str(link))
+                arguments += ("--stylus", stylus.address)
             run = folder / "run"
             self.console = stack.enter_context(
                 Console(run, str(file), arguments, environment=self._environment)
@@ -86,11 +97,13 @@ class Bench:
             stack.callback(self._supervision.close)
             self.api = Api(self.console.base, self.console.token)
             self.api.take_lease()
-            home = self.watch.newest()["outcome"]["report"]["commanded_position"][0] * 1e3
-            self.leader = StreamLeader(self.api, Circle(home))
-            stack.callback(self.leader.close)
-            if self.hardware:
-                self.home()
+            stands = self.watch.newest()["outcome"]["report"][0]
+            self._home_mm = stands["commanded_position"] * 1e3
+            self._home_wxyz = stands["commanded_wxyz"].copy()
+            self.page = StreamLeader(self.api, Circle(self._home_mm), leads=self.stylus is None)
+            stack.callback(self.page.close)
+            self._devices = MappedSlot(run / DEVICES_FILE, DEVICES)
+            stack.callback(self._devices.close)
             self._rest = stack.pop_all()
         return self
 
@@ -119,15 +132,9 @@ class Bench:
             Deadline.LOST_WEB: WEB_SILENT_MS,
             Deadline.HUNG: HUNG_MS,
             Deadline.LATE: 200.0,
+            Deadline.TOLD: 200.0,
             Deadline.ANSWER: 1000.0,
         }[deadline]
-
-    def home(self) -> None:
-        """Find the tendons' zero, as a person does before the first enabling."""
-        self.ask("home")
-        self.wait(
-            lambda: bool(self.watch.newest()["input"]["readiness"][0] == 0), "homing", _HOMING_S
-        )
 
     def ask(self, act: str) -> Answer:
         """POST one of the API's acts."""
@@ -153,6 +160,25 @@ class Bench:
         except MappedReadError:
             return 0
 
+    def devices(self) -> Records:
+        """What control says of its devices, () DEVICES; zeros before the first word."""
+        try:
+            return np.asarray(self._devices.read()[0])
+        except MappedReadError:
+            return np.zeros((), DEVICES)
+
+    def bus_text(self, field: str) -> str:
+        """A text of what control says of the bus."""
+        return bytes(self.devices()["bus"][field]).decode(errors="replace").rstrip("\0")
+
+    def stylus_count(self, name: str) -> int:
+        """One of the counters of what came from the stylus; see ``STYLUS_COUNTS``."""
+        status = MappedSlot(self.console.directory / STYLUS_STATUS_FILE, STYLUS_STATUS)
+        try:
+            return int(status.read()["counts"][name][0])
+        finally:
+            status.close()
+
     def supervision(self) -> Records:
         """What the supervisor says, (1,) SUPERVISION."""
         return self._supervision.read()
@@ -175,37 +201,36 @@ class Bench:
             BenchFailed: it does not get there.
         """
         ends = time.monotonic() + _ARM_S
-        self.leader.quiet = False
-        self.leader.tamper(None)
+        self.page.quiet = False
+        self.page.tamper(None)
         while time.monotonic() < ends:
-            if self._arm_once():
+            self.press(False)
+            self.recover()
+            if self.drives():
                 return
         state, why = self.now()
         raise BenchFailed(
             f"the robot is not driven within {_ARM_S:g} s: {state.name}, {REASONS[why][0]}"
         )
 
-    def _arm_once(self) -> bool:
-        self.leader.clutch = False
-        if not self.api.take_lease():
-            time.sleep(0.1)
-            return False
-        state, _ = self.now()
-        if state == Safety.FAULT:
-            self.ask("reset")
-        if state != Safety.ENABLED and not self.ask("enable").ok:
-            time.sleep(0.1)
-            return False
-        time.sleep(0.05)
-        return self.drives()
+    def press(self, closed: bool) -> None:
+        """Close the leader's clutch, or open it."""
+        if self.stylus is None:
+            self.page.clutch = closed
+        elif closed:
+            self.stylus.ask(press=1)
+        else:
+            self.stylus.ask(release=True)
 
     def drives(self, within_s: float = 3.0) -> bool:
         """Close the clutch anew; whether the commanded tip then goes with the leader."""
-        self.leader.clutch = False
-        time.sleep(0.04)
+        self.press(False)
+        time.sleep(0.05)
+        if self.stylus is not None:
+            self._go_home()
         at = self.watch.newest()["outcome"]["report"]["commanded_position"][0] * 1e3
-        self.leader.circle.begin_at(np.array(at))
-        self.leader.clutch = True
+        self.page.circle.begin_at(np.array(at))
+        self.press(True)
         self.watch.mark()
         ends = time.monotonic() + within_s
         while time.monotonic() < ends:
@@ -217,40 +242,80 @@ class Bench:
             time.sleep(_LOOK_S)
         return False
 
-    def recover(self, recovery: tuple[str, ...]) -> bool:
-        """Do what a person does after a fault; whether the robot is driven again."""
-        self.api.take_lease()
-        for act in recovery:
-            if act == "home":
-                self.home()
-            elif act in _WAITS:
-                self.ask(act)
-                self.wait_ready()
-            else:
-                self._until_ok(act)
-        return self.drives()
+    def turned_home(self) -> dict[str, list[float]]:
+        """A target at home, turned so far that the segment has to bend; for the API."""
+        half, (w, x, y, z) = 0.5 * _TURN_RAD, self._home_wxyz
+        c, s = math.cos(half), -math.sin(half)
+        turned = (c * w - s * x, c * x + s * w, c * y - s * z, c * z + s * y)
+        return {
+            "position_mm": [float(one) for one in self._home_mm],
+            "orientation_wxyz": [float(one) for one in turned],
+        }
 
-    def _until_ok(self, act: str) -> None:
-        ends = time.monotonic() + _ARM_S
-        while not self.ask(act).ok:
-            if time.monotonic() > ends:
-                raise BenchFailed(f"{act} was refused for {_ARM_S:g} s: {self.ask(act).body}")
-            time.sleep(0.05)
+    def _go_home(self) -> None:
+        """A stylus leads from wherever the tip is: bring it back, or it wanders off in the end."""
+        target = {
+            "position_mm": [float(one) for one in self._home_mm],
+            "orientation_wxyz": [float(one) for one in self._home_wxyz],
+        }
+        if not self.api.call("POST", "/target", target).ok:
+            return
+        ends = time.monotonic() + _GO_HOME_S
+        while time.monotonic() < ends:
+            at = self.watch.newest()["outcome"]["report"]["commanded_position"][0] * 1e3
+            if float(np.linalg.norm(at - self._home_mm)) < _AT_HOME_MM:
+                return
+            time.sleep(_LOOK_S)
+
+    def recover(self) -> tuple[str, ...]:
+        """Do what a person does after a fault, one act after the other, until the robot is ENABLED.
+
+        Returns:
+            The acts: endpoints of the API.
+
+        Raises:
+            BenchFailed: it does not get there.
+        """
+        acts: list[str] = []
+        ends = time.monotonic() + _RECOVER_S
+        while time.monotonic() < ends:
             self.api.take_lease()
+            act = self._next_act()
+            if act == "":
+                return tuple(acts)
+            if act != _PATIENCE and self.ask(act).ok:
+                acts += [act] if acts[-1:] != [act] else []
+            time.sleep(0.05)
+        state, why = self.now()
+        detail = self.ask("enable").body.get("detail", "")
+        raise BenchFailed(f"no way out of {state.name}, {REASONS[why][0]}: {detail}")
 
-    def wait_ready(self) -> None:
-        """Wait until the devices are."""
-        self.wait(
-            lambda: bool(self.watch.newest()["input"]["readiness"][0] == 0), "devices are ready"
-        )
+    def _next_act(self) -> str:
+        newest = self.watch.newest()
+        state, _ = self.now()
+        readiness = Readiness(int(newest["input"]["readiness"][0]))
+        act = "enable"
+        if state == Safety.ENABLED:
+            act = ""
+        elif readiness in (Readiness.NOT_CONNECTED, Readiness.BUSY):
+            act = _PATIENCE
+        elif readiness == Readiness.DEVICE_FAULT:
+            act = "devices/reboot"
+        elif state == Safety.FAULT:
+            act = "reset"
+        elif readiness == Readiness.TORQUE_OFF:
+            act = "torque/hold"
+        elif readiness == Readiness.NOT_HOMED:
+            act = "home" if state == Safety.DISABLED else "disable"
+        return act
 
     def inject(self, name: str) -> int:
         """Break the simulated robot; when control took the request in, ns."""
-        return self._taken(self.api.call("POST", "/fault", {"fault": name}))
+        return self._taken(self.api.call("POST", "/faults", {"name": name}))
 
     def mend(self) -> None:
         """Mend the simulated robot."""
-        self.api.call("DELETE", "/fault")
+        self.api.call("DELETE", "/faults")
 
     def _taken(self, answer: Answer) -> int:
         """The stamp of the last record without what has just been asked for."""
@@ -261,8 +326,3 @@ class Bench:
         later = np.flatnonzero(numbers > numbers[0])
         place = max(0, int(later[0]) - 1) if len(later) else len(records) - 1
         return int(records["header"]["stamp_ns"][place])
-
-
-_REPLY_MS = 4.0
-_WAITS = ("reboot-devices",)
-_NOTHING = Request.NONE

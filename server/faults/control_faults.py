@@ -11,10 +11,9 @@ from robot.records import Refusal, Safety
 from robot.safety import Event
 from server.faults.bench import Bench
 from server.faults.fault import Deadline, Fault, Finding, Group
-from server.faults.stopping import LOOK_S, NOTICE_S, afterwards, describe, stamp, stopped
+from server.faults.stopping import LOOK_S, NOTICE_S, afterwards, describe, recovered, stamp, stopped
 from server.faults.watching import Records, commanded_path_mm, reach_mm, safety, stands_still
 
-_RESET = ("reset", "enable")
 _RESTART_S = 40.0
 
 
@@ -23,7 +22,6 @@ def _in_plant(
     title: str,
     event: Event,
     state: Safety,
-    recovery: tuple[str, ...] = _RESET,
     also: tuple[Event, ...] = (),
     deadline: Deadline = Deadline.BUS,
 ) -> Fault:
@@ -33,7 +31,6 @@ def _in_plant(
         title,
         stopped,
         deadline,
-        recovery,
         begin=lambda bench: bench.inject(name),
         mend=Bench.mend,
         events=(event, *also),
@@ -64,14 +61,14 @@ def _stuck(bench: Bench, fault: Fault) -> Finding:
     try:
         return _noticed_late(bench, fault)
     finally:
-        bench.leader.circle.swing(False)
+        bench.page.circle.swing(False)
 
 
 def _noticed_late(bench: Bench, fault: Fault) -> Finding:
     bench.arm()
     bench.watch.mark()
     began_ns = fault.begin(bench)
-    bench.leader.circle.swing(True)
+    bench.page.circle.swing(True)
     place = bench.watch.until(lambda records: safety(records) != Safety.ENABLED, NOTICE_S)
     finding = Finding()
     if place is None:
@@ -96,7 +93,7 @@ def _exception(bench: Bench, fault: Fault) -> Finding:
     bench.watch.mark()
     before = bench.pid("control")
     began_ns = time.monotonic_ns()
-    bench.api.call("POST", "/fault", {"fault": fault.name}, timeout_s=0.5)
+    bench.api.call("POST", "/faults", {"name": fault.name}, timeout_s=0.5)
     place = bench.watch.until(lambda records: safety(records) == Safety.FAULT, NOTICE_S)
     finding = Finding()
     if place is None:
@@ -111,14 +108,14 @@ def _exception(bench: Bench, fault: Fault) -> Finding:
     time.sleep(LOOK_S)
     records = bench.watch.records()
     finding.stayed_stopped = stands_still(records) and commanded_path_mm(records) < 1e-3
-    finding.recovered = bench.recover(fault.recovery)
+    recovered(bench, finding)
     return finding
 
 
 def _outside_at_start(bench: Bench, fault: Fault) -> Finding:
     """A robot that stands outside its limits cannot be enabled."""
     bench.arm()
-    bench.leader.clutch = False
+    bench.press(False)
     bench.ask("disable")
     bench.watch.mark()
     began_ns = bench.inject("outside-limits")
@@ -130,7 +127,7 @@ def _outside_at_start(bench: Bench, fault: Fault) -> Finding:
     if place is not None:
         first_ns = stamp(bench.watch.records()[place : place + 1])
         finding.detected_within_ms = max(0.0, (first_ns - began_ns) * 1e-6)
-    bench.leader.clutch = True
+    bench.press(True)
     time.sleep(LOOK_S)
     records = bench.watch.records()
     finding.commanded_travel_mm, finding.coast_mm = commanded_path_mm(records), reach_mm(records)
@@ -175,7 +172,7 @@ def _pulled(bench: Bench, refusal: Refusal, direction: NDArray[np.float64]) -> F
     bench.arm()
     bench.watch.mark()
     began_ns = time.monotonic_ns()
-    bench.leader.circle.pull(direction)
+    bench.page.circle.pull(direction)
     place = bench.watch.until(
         lambda records: records["outcome"]["report"]["target_refused"] == refusal, NOTICE_S
     )
@@ -196,7 +193,7 @@ def _pulled(bench: Bench, refusal: Refusal, direction: NDArray[np.float64]) -> F
         )
         finding.detected &= bool(beyond.max() < 0.1)
         finding.message = str(bench.api.state().get("safety", {}).get("reason", ""))
-    bench.leader.circle.pull(None)
+    bench.page.circle.pull(None)
     finding.recovered = bench.drives()
     return finding
 
@@ -218,7 +215,6 @@ CONTROL_FAULTS = (
         "Measurements stop coming",
         stopped,
         Deadline.LEADER,
-        _RESET,
         begin=lambda bench: bench.inject("measurement-silent"),
         mend=Bench.mend,
         events=(Event.MEASUREMENT_LOST,),
@@ -233,7 +229,6 @@ CONTROL_FAULTS = (
         "A joint of the arm is stuck",
         _stuck,
         Deadline.BUS,
-        _RESET,
         begin=lambda bench: bench.inject("joint-stuck"),
         mend=Bench.mend,
         state=Safety.FAULT,
@@ -244,7 +239,6 @@ CONTROL_FAULTS = (
         "A servo is stuck",
         _stuck,
         Deadline.BUS,
-        _RESET,
         begin=lambda bench: bench.inject("servo-stuck"),
         mend=Bench.mend,
         state=Safety.FAULT,
@@ -254,26 +248,24 @@ CONTROL_FAULTS = (
     _in_plant("arm-pushed", "Something pushes the arm off the trocar", Event.TROCAR_LEFT,
               Safety.FAULT, deadline=Deadline.LEADER),
     _in_plant("contact", "The instrument presses too hard", Event.CONTACT_FORCE, Safety.PAUSED,
-              ("enable",)),
+              ),
     Fault(
         "outside-limits-at-start",
         Group.CONTROL,
         "The robot stands outside its limits at the start",
         _outside_at_start,
         Deadline.BUS,
-        ("enable",),
         mend=Bench.mend,
         state=Safety.DISABLED,
     ),
     _in_plant("late-tick", "A tick is overrun by 150 ms", Event.CONTROL_LATE, Safety.PAUSED,
-              ("enable",), also=(Event.LEADER_STALE,), deadline=Deadline.LATE),
+              also=(Event.LEADER_STALE,), deadline=Deadline.LATE),
     Fault(
         "plant-exception",
         Group.CONTROL,
         "The plant's code fails",
         _exception,
         Deadline.BUS,
-        ("enable",),
         state=Safety.FAULT,
     ),
     Fault(
@@ -282,7 +274,6 @@ CONTROL_FAULTS = (
         "What is to be drawn is no number",
         _picture,
         Deadline.BUS,
-        (),
         begin=lambda bench: bench.inject("picture-impossible"),
         mend=Bench.mend,
     ),
@@ -292,6 +283,5 @@ CONTROL_FAULTS = (
         "The leader pulls the tip out through the trocar",
         lambda bench, fault: _pulled(bench, Refusal.BEHIND_TROCAR, np.array([0.0, 0.0, 300.0])),
         Deadline.BUS,
-        (),
     ),
 )  # fmt: skip

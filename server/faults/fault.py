@@ -37,6 +37,7 @@ class Deadline(Enum):
     LOST_WEB = "the web process may be silent for 1 s"
     HUNG = "the supervisor's patience: 5 s"
     LATE = "the tick that came late"
+    TOLD = "the devices' own report, ten times a second"
     ANSWER = "the answer to what was asked"
 
 
@@ -58,7 +59,8 @@ class Finding:
         coast_mm: how far the tip still went in that second.
         message: what a person reads.
         stayed_stopped: whether nothing moved by itself once the cause was gone.
-        recovered: whether it drove again after ``recovery``.
+        recovery: what a person did then: endpoints of the API in this order.
+        recovered: whether it drove again after that.
         tolerated: whether the robot goes on by design, the fault being counted.
         counter: what counted it.
         remark: what else there is to know.
@@ -72,6 +74,7 @@ class Finding:
     coast_mm: float | None = None
     message: str = ""
     stayed_stopped: bool | None = None
+    recovery: tuple[str, ...] = ()
     recovered: bool | None = None
     tolerated: bool = False
     counter: str = ""
@@ -89,7 +92,6 @@ class Fault:
         title: for people.
         measure: injects it, and finds out.
         deadline: within which it must be noticed.
-        recovery: what a person does: endpoints of the API in this order.
         begin: injects it; the monotonic time in ns at which it began.
         mend: takes the cause away.
         events: any of these is noticing it.
@@ -102,7 +104,6 @@ class Fault:
     title: str
     measure: Callable[[Bench, Fault], Finding]
     deadline: Deadline = Deadline.LEADER
-    recovery: tuple[str, ...] = ("enable",)
     begin: Callable[[Bench], int] = field(default=lambda _: 0)
     mend: Callable[[Bench], None] = field(default=lambda _: None)
     events: tuple[Event, ...] = ()
@@ -137,7 +138,7 @@ def row(fault: Fault, finding: Finding, limit_ms: float) -> dict[str, Any]:
         "commanded_travel_mm": rounded(finding.commanded_travel_mm),
         "coast_mm": rounded(finding.coast_mm),
         "message": finding.message,
-        "recovery": ", then ".join(fault.recovery) or "none needed",
+        "recovery": ", then ".join(finding.recovery) or "none needed",
         "stayed_stopped": finding.stayed_stopped,
         "recovered": finding.recovered,
         "tolerated": finding.tolerated,

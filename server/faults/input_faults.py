@@ -27,15 +27,15 @@ def _begin(how: Tamper) -> Callable[[Bench], int]:
     """Tamper with every sample from the next one on; the fault begins with that one."""
 
     def begin(bench: Bench) -> int:
-        bench.leader.tamper(how)
-        bench.wait(lambda: bench.leader.tampered_ns > 0, "the next sample", _FIRST_S)
-        return bench.leader.tampered_ns
+        bench.page.tamper(how)
+        bench.wait(lambda: bench.page.tampered_ns > 0, "the next sample", _FIRST_S)
+        return bench.page.tampered_ns
 
     return begin
 
 
 def _mend(bench: Bench) -> None:
-    bench.leader.tamper(None)
+    bench.page.tamper(None)
 
 
 def _silent(_sample: Sample, _count: int) -> Sample | None:
@@ -63,7 +63,6 @@ def _stopping(name: str, title: str, how: Tamper, events: tuple[Event, ...] = _D
         title,
         stopped,
         Deadline.LEADER,
-        ("enable",),
         begin=_begin(how),
         mend=_mend,
         events=events,
@@ -119,7 +118,7 @@ def _wrong_scale(value: float) -> Callable[[Bench, Fault], Finding]:
 
 
 def _scale(name: str, title: str, value: float) -> Fault:
-    return Fault(name, Group.INPUT, title, _wrong_scale(value), Deadline.ANSWER, ())
+    return Fault(name, Group.INPUT, title, _wrong_scale(value), Deadline.ANSWER)
 
 
 _ZERO, _NAN = [0.0, 0.0, 0.0, 0.0], [math.nan, 0.0, 0.0]
@@ -137,8 +136,7 @@ INPUT_FAULTS = (
         "A program's connection is cut with its clutch closed",
         stopped,
         Deadline.LEADER,
-        ("enable",),
-        begin=lambda bench: bench.leader.cut(),
+        begin=lambda bench: bench.page.cut(),
         events=_GONE,
         state=Safety.PAUSED,
     ),
@@ -148,7 +146,6 @@ INPUT_FAULTS = (
         "Quaternions change their sign from sample to sample",
         _both_signs,
         Deadline.LEADER,
-        (),
         begin=_begin(_other_sign),
         mend=_mend,
     ),

@@ -88,6 +88,7 @@ class StreamLeader:
     Args:
         api: of the console, with the lease.
         circle: where the hand is.
+        leads: whether it sends samples at all, or only lets the operator live.
 
     Attributes:
         clutch: whether the clutch is closed.
@@ -96,8 +97,8 @@ class StreamLeader:
         quiet: neither samples nor heartbeats are sent, as from a page that is asleep.
     """
 
-    def __init__(self, api: Api, circle: Circle) -> None:
-        self.api, self.circle = api, circle
+    def __init__(self, api: Api, circle: Circle, *, leads: bool = True) -> None:
+        self.api, self.circle, self._leads = api, circle, leads
         self.clutch, self.quiet = False, False
         self.problems: list[tuple[int, dict[str, Any]]] = []
         self.tampered_ns = 0
@@ -173,7 +174,7 @@ class StreamLeader:
             self._over.wait(max(0.0, due - time.monotonic()))
 
     def _sample(self) -> Sample | None:
-        if self.quiet or not self.api.lease:
+        if self.quiet or not self._leads or not self.api.lease:
             return None
         sample: Sample | None = {
             "type": "leader",

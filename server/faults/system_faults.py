@@ -15,7 +15,7 @@ from robot.safety import Event
 from server.faults.access import Api
 from server.faults.bench import Bench
 from server.faults.fault import Deadline, Fault, Finding, Group
-from server.faults.stopping import LOOK_S, NOTICE_S, stopped
+from server.faults.stopping import LOOK_S, NOTICE_S, recovered, stopped
 from server.faults.watching import commanded_path_mm, reach_mm, safety, stands_still
 
 _GONE = (Event.OPERATOR_LOST, Event.LEADER_STALE)
@@ -29,7 +29,6 @@ def _kill(name: str) -> Fault:
         f"SIGKILL of the {name} process",
         stopped,
         Deadline.HANG_UP,
-        ("enable",),
         begin=lambda bench: bench.signal(name, signal.SIGKILL),
         mend=_web_is_back,
         events=_GONE,
@@ -43,12 +42,12 @@ def _web_is_back(bench: Bench) -> None:
 
 def _sleep(bench: Bench) -> int:
     began_ns = time.monotonic_ns()
-    bench.leader.quiet = True
+    bench.page.quiet = True
     return began_ns
 
 
 def _awake(bench: Bench) -> None:
-    bench.leader.quiet = False
+    bench.page.quiet = False
 
 
 def _freeze(bench: Bench) -> int:
@@ -82,7 +81,7 @@ def _control_gone(bench: Bench, fault: Fault, number: signal.Signals) -> Finding
     time.sleep(LOOK_S)
     records = bench.watch.records()
     finding.stayed_stopped = stands_still(records) and commanded_path_mm(records) < 1e-3
-    finding.recovered = bench.recover(fault.recovery)
+    recovered(bench, finding)
     return finding
 
 
@@ -200,8 +199,7 @@ SYSTEM_FAULTS = (
         "The operator's connection is cut",
         stopped,
         Deadline.LEADER,
-        ("enable",),
-        begin=lambda bench: bench.leader.cut(),
+        begin=lambda bench: bench.page.cut(),
         events=_GONE,
         state=Safety.PAUSED,
     ),
@@ -211,20 +209,18 @@ SYSTEM_FAULTS = (
         "The page falls asleep: neither samples nor heartbeats",
         stopped,
         Deadline.LEADER,
-        ("enable",),
         begin=_sleep,
         mend=_awake,
         events=_GONE,
         state=Safety.PAUSED,
     ),
-    Fault("slow-client", Group.SYSTEM, "A client does not read", _slow_client, Deadline.LEADER, ()),
+    Fault("slow-client", Group.SYSTEM, "A client does not read", _slow_client, Deadline.LEADER),
     Fault(
         "second-operator",
         Group.SYSTEM,
         "A second operator wants to drive",
         _second_operator,
         Deadline.ANSWER,
-        (),
     ),
     _kill("web"),
     Fault(
@@ -233,7 +229,6 @@ SYSTEM_FAULTS = (
         "The web process hangs",
         stopped,
         Deadline.LEADER,
-        ("enable",),
         begin=_freeze,
         mend=_thaw,
         events=_GONE,
@@ -245,7 +240,6 @@ SYSTEM_FAULTS = (
         "SIGKILL of the control process",
         _killed_control,
         Deadline.HANG_UP,
-        ("enable",),
     ),
     Fault(
         "control-hung",
@@ -253,7 +247,6 @@ SYSTEM_FAULTS = (
         "The control process hangs",
         _hung_control,
         Deadline.HUNG,
-        ("enable",),
     ),
     Fault(
         "control-ended",
@@ -261,10 +254,9 @@ SYSTEM_FAULTS = (
         "SIGTERM of the control process",
         _ended_control,
         Deadline.HANG_UP,
-        ("enable",),
     ),
 )
 LAST_FAULTS = (
-    Fault("sigterm", Group.SYSTEM, "SIGTERM of the console", _sigterm, Deadline.HANG_UP, ()),
+    Fault("sigterm", Group.SYSTEM, "SIGTERM of the console", _sigterm, Deadline.HANG_UP),
 )
 """After these there is no console any more."""

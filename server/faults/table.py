@@ -13,13 +13,22 @@ from robot.configuration import Configuration
 from robot.errors import KeyholeError, UnknownName
 from server.configuration_file import load
 from server.faults.bench import Bench
+from server.faults.bus_faults import BUS_FAULTS
 from server.faults.control_faults import CONTROL_FAULTS
 from server.faults.fault import Fault, Finding, row
 from server.faults.input_faults import INPUT_FAULTS
+from server.faults.stylus_faults import STYLUS_FAULTS
 from server.faults.system_faults import LAST_FAULTS, SYSTEM_FAULTS
 
 SCHEMA_VERSION = 1
-FAULTS: tuple[Fault, ...] = (*INPUT_FAULTS, *CONTROL_FAULTS, *SYSTEM_FAULTS, *LAST_FAULTS)
+FAULTS: tuple[Fault, ...] = (
+    *BUS_FAULTS,
+    *STYLUS_FAULTS,
+    *INPUT_FAULTS,
+    *CONTROL_FAULTS,
+    *SYSTEM_FAULTS,
+    *LAST_FAULTS,
+)
 
 
 def chosen(names: Sequence[str]) -> tuple[Fault, ...]:

@@ -161,14 +161,6 @@ class BoardChange(Body):
     )
 
 
-class FaultInjection(Body):
-    """How the simulated robot shall break."""
-
-    fault: Annotated[str, Field(min_length=1, max_length=80)] = Field(
-        description="Name from GET faults.", examples=["joint-stuck"]
-    )
-
-
 class TrocarRegistration(Body):
     """Where the trocar is: where the tip touches it, at a position, or as configured."""
 
@@ -240,13 +232,6 @@ class BoardEntry(BaseModel):
     name: str
     title: str
     present: bool = Field(description="Whether it stands before the instrument now.")
-
-
-class FaultEntry(BaseModel):
-    """One fault that can be injected into a simulated robot."""
-
-    name: str
-    title: str
 
 
 class TrocarEntry(BaseModel):

@@ -16,7 +16,6 @@ from server.web import (
     api_audit,
     api_boards,
     api_devices,
-    api_faults,
     api_lease,
     api_motion,
     api_paths,
@@ -83,7 +82,6 @@ def create_app(
     problems.install(app)
     for part in (api_robot, api_lease, api_safety, api_motion, api_paths, api_trocar, api_boards):
         app.include_router(part.router, dependencies=[api_replay.RobotOnly])
-    app.include_router(api_faults.router, dependencies=[api_replay.RobotOnly])
     app.include_router(api_devices.router, dependencies=[api_replay.RobotOnly])
     app.include_router(api_audit.router)
     app.include_router(api_recording.router, dependencies=[api_replay.RobotOnly])
