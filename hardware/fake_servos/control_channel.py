@@ -64,6 +64,9 @@ class ControlChannel:
             connection.settimeout(1.0)
             self._clients[connection.fileno()] = (connection, bytearray())
             return
+        if descriptor not in self._clients:
+            # It was the port's, which has hung up since it was waited on.
+            return
         connection, buffer = self._clients[descriptor]
         try:
             data = connection.recv(_LARGEST_LINE)
