@@ -67,8 +67,10 @@ class XArm:
         """
         hardware, joints = configuration.hardware, configuration.arm.joints
         self.address = arm_address(hardware.arm_address)
-        self._lower = np.array([joint.lower_rad for joint in joints])
-        self._upper = np.array([joint.upper_rad for joint in joints])
+        lower = np.array([joint.lower_rad for joint in joints])
+        upper = np.array([joint.upper_rad for joint in joints])
+        self._lowest, self._highest = lower - _OUTSIDE_RAD, upper + _OUTSIDE_RAD
+        self._judged, self._inside = -1, False
         fastest = _CATCH_UP * configuration.limits.joint_speed_rad_s
         speed = np.array([min(joint.speed_rad_s, fastest) for joint in joints])
         self._lost_ns = round(lost_s * 1e9)
@@ -82,8 +84,8 @@ class XArm:
             realtime=configuration.control.realtime != "off",
         )
         self._follower = Follower(
-            self._lower,
-            self._upper,
+            lower,
+            upper,
             speed / hardware.arm_rate_hz,
             NEAR_RAD,
             configuration.limits.tracking_error_rad,
@@ -104,7 +106,7 @@ class XArm:
         if not fresh or worker.doubted or stage == Stage.SEARCHING:
             return ArmReading(fresh, age * 1e-9, Event.ARM_LOST, Readiness.NOT_CONNECTED)
         readiness = Readiness.BUSY if worker.recovering else _READINESS[stage]
-        if readiness == Readiness.READY and not self._inside(out_q):
+        if readiness == Readiness.READY and not self._stands_inside(out_q):
             readiness = Readiness.OUTSIDE_LIMITS
         return ArmReading(True, age * 1e-9, _EVENTS.get(stage, Event.NOTHING), readiness)
 
@@ -145,6 +147,10 @@ class XArm:
         """Stop the arm under torque, and disconnect."""
         self._worker.end()
 
-    def _inside(self, q: np.ndarray) -> bool:
-        low, high = self._lower - _OUTSIDE_RAD, self._upper + _OUTSIDE_RAD
-        return bool(np.all((q >= low) & (q <= high)))
+    def _stands_inside(self, q: np.ndarray) -> bool:
+        """Whether the joints of the newest report are inside their limits; judged once for each."""
+        received = self._reports.received
+        if received != self._judged:
+            self._judged = received
+            self._inside = bool(np.all((q >= self._lowest) & (q <= self._highest)))
+        return self._inside

@@ -67,7 +67,7 @@ def execute(arguments: argparse.Namespace) -> int:
         fake = FakeArm(controller, address, arguments.control, faults)
         try:
             print(f"fake arm at {address}, control channel at {arguments.control}", flush=True)
-            fake.run(signals.received)
+            fake.run(signals.received, realtime=True)
         finally:
             fake.close()
     return 0

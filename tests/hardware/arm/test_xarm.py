@@ -70,7 +70,14 @@ class Rig:
         """From where it stands turn the first joint evenly; where that leads."""
         self.reading()
         begin = self.q.copy()
-        self.write(begin - 1e-4, 5)
+        self.fake.goals.clear()
+
+        def followed() -> bool:
+            self.write(begin - 1e-5)
+            self.write(begin)
+            return len(self.fake.goals) > 0
+
+        self.until(followed)
         for tick in range(ticks + 1):
             self.write(begin + np.eye(7)[0] * way * tick / ticks)
         begin[0] += way
@@ -101,10 +108,11 @@ def shared() -> Iterator[Rig]:
 
 @pytest.fixture
 def rig(shared: Rig) -> Rig:
-    """Connected, without faults, ready."""
+    """Connected, without faults, ready; the command that it does not follow yet is far away."""
+    shared.reading()
+    shared.write(shared.q - 0.5)
     shared.arm.recover()
     shared.until_ready()
-    shared.write(shared.q - 0.5)
     return shared
 
 
@@ -120,7 +128,6 @@ def test_it_prepares_itself_and_stands(rig: Rig) -> None:
 
 
 def test_it_follows_and_never_faster_than_it_may(rig: Rig) -> None:
-    rig.fake.goals.clear()
     goal = rig.move(0.15, 200)
     rig.until(rig.arrived(goal))
     steps = np.abs(np.diff([goal.q for goal in rig.fake.goals], axis=0))
@@ -144,15 +151,16 @@ def test_far_or_jumping_commands_move_nothing(rig: Rig) -> None:
 
 
 def test_a_command_outside_of_the_limits_never_reaches_the_controller(rig: Rig) -> None:
-    rig.move(0.01, 20)
-    rig.reading()
-    _, upper = limits()
-    goal = rig.q.copy()
-    goal[5] = upper[5] + 0.05
+    controller, upper = rig.fake.controller, limits()[1][5]
+    controller.q[5] = controller.target[5] = upper - 0.005
+    rig.until(rig.arrived(controller.q))
+    goal = rig.move(0.01, 20)
+    goal[5] = upper + 0.003
     rig.write(goal, 60)
     rig.until(lambda: "joint limits" in rig.message())
-    assert rig.fake.controller.error == 0
-    assert all(sent.q[5] <= upper[5] for sent in rig.fake.goals)
+    assert controller.error == 0
+    assert all(sent.q[5] <= upper for sent in rig.fake.goals)
+    controller.q[5] = controller.target[5] = START[5]
 
 
 @pytest.mark.parametrize(
@@ -229,6 +237,16 @@ def test_joints_that_are_no_numbers_are_not_taken(rig: Rig) -> None:
     rig.until(lambda: rig.reading()[0] == Event.ARM_LOST)
     assert np.all(np.isfinite(rig.q))
     rig.fake.clear("not-a-number")
+    rig.until_ready()
+
+
+def test_an_arm_that_stands_outside_of_its_limits_is_not_ready(rig: Rig) -> None:
+    controller = rig.fake.controller
+    stood = controller.q.copy()
+    controller.q[5] = controller.target[5] = limits()[1][5] + 0.05
+    rig.until(lambda: rig.reading() == (Event.NOTHING, Readiness.OUTSIDE_LIMITS))
+    assert rig.stands()
+    controller.q[:] = controller.target[:] = stood
     rig.until_ready()
 
 
