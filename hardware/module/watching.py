@@ -21,7 +21,8 @@ MISSES = 2
 _LASTING = 5
 """Cycles in a row outside a limit that are an event: one reading may be a spike."""
 _STUCK_RAD = math.radians(2.5)
-"""A goal that went so far while the encoder said nothing moved."""
+_STUCK_S = 0.1
+"""A goal that went so far, and so long ago, while the encoder said nothing moved."""
 _MOVES_TICKS = 2
 _LOAD_UNIT = TABLE["present_load"].unit_scale
 _VOLT_UNIT = TABLE["present_input_voltage"].unit_scale
@@ -47,7 +48,9 @@ class ServoWatch:
         self._lowest_volt = settings.voltage_min_v / _VOLT_UNIT
         self._highest_volt = settings.voltage_max_v / _VOLT_UNIT
         self._stuck = _STUCK_RAD * ticks_per_rad
+        self._stuck_cycles = math.ceil(_STUCK_S * settings.rate_hz)
         self._outside = [0] * SERVOS
+        self._still = [0] * SERVOS
         self._rest_position = [0] * SERVOS
         self._rest_goal = [0] * SERVOS
 
@@ -55,7 +58,7 @@ class ServoWatch:
         """Begin anew, as after a reconnection."""
         self.event, self.message, self.alerts = 0, "", 0
         for index in range(SERVOS):
-            self.missed[index] = self._outside[index] = 0
+            self.missed[index] = self._outside[index] = self._still[index] = 0
             self._rest_position[index] = cycle.position[index]
             self._rest_goal[index] = goals[index]
 
@@ -99,7 +102,12 @@ class ServoWatch:
         position = cycle.position[index]
         if abs(position - self._rest_position[index]) >= _MOVES_TICKS:
             self._rest_position[index], self._rest_goal[index] = position, goal
+            self._still[index] = 0
         elif abs(goal - self._rest_goal[index]) > self._stuck:
+            self._still[index] += 1
+        else:
+            self._still[index] = 0
+        if self._still[index] >= self._stuck_cycles:
             return "stands still while its goal moves: its encoder is stuck or the tendon blocked"
         return ""
 

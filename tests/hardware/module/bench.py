@@ -28,7 +28,7 @@ def settings(port: Path, **changes: Any) -> Configuration:
     configuration = load()
     patient = {
         "port": str(port),
-        "rate_hz": 100.0,
+        "rate_hz": 50.0,
         "watchdog_ms": 400,
         "homing_speed_deg_s": 80.0,
         "profile_velocity_deg_s": 360.0,
@@ -90,6 +90,11 @@ class Bench:
             lambda _: bool(np.all(np.abs(self.angles - target) < 0.06)),
             lambda seconds: start + (target - start) * min(1.0, seconds),
         )
+
+    def insist(self, angles: np.ndarray, seconds: float = 0.15) -> None:
+        """Command a motion to ``angles`` at once."""
+        end = time.monotonic() + seconds
+        self.until(lambda _: time.monotonic() > end, lambda _: angles)
 
     def rest(self, seconds: float = 0.05) -> None:
         """Command what stands, not moving."""

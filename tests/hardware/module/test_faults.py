@@ -43,7 +43,7 @@ def _holds(made: Bench) -> None:
 def test_one_bad_answer_is_counted_and_not_used(homed: Bench, fault: str) -> None:
     before = homed.devices()
     counted = before["missed"] + before["bad_packets"]
-    homed.servos.inject(fault)
+    homed.servos.inject(fault, **({"delay_ms": 80.0} if fault == "late" else {}))
 
     def told(_: object) -> bool:
         bus = homed.devices()

@@ -55,12 +55,9 @@ def test_what_is_not_a_motion_is_not_followed(homed: Bench) -> None:
 
 def test_a_motion_that_does_not_begin_where_the_servos_are_is_not_followed(homed: Bench) -> None:
     homed.module.hold()
-    homed.rest()
+    homed.rest(0.1)
     goals = homed.goals()
-    homed.command[:] += 0.2
-    for _ in range(30):
-        homed.module.write(homed.command, True)
-        homed.servos.state()
+    homed.insist(homed.command + 0.2)
     assert homed.goals() == goals
     assert "does not begin where the servos are" in homed.message
 
@@ -68,14 +65,9 @@ def test_a_motion_that_does_not_begin_where_the_servos_are_is_not_followed(homed
 def test_hold_stops_and_ignores_the_motion_that_goes_on(homed: Bench) -> None:
     homed.drive_to((0.1, 0.0, -0.1, 0.0))
     homed.module.hold()
-    for _ in range(30):
-        homed.module.write(homed.command, True)
-        homed.servos.state()
+    homed.insist(homed.command)
     goals = homed.goals()
-    homed.command[:] += 0.3
-    for _ in range(30):
-        homed.module.write(homed.command, True)
-        homed.servos.state()
+    homed.insist(homed.command + 0.05)
     assert homed.goals() == goals
 
 
