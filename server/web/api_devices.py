@@ -1,15 +1,21 @@
-"""The devices: their state, homing, torque, reboot."""
+"""The devices: their state, homing, torque, reboot, and faults of a simulated robot on request."""
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from fastapi import APIRouter
+from pydantic import BaseModel, Field
 from starlette.responses import Response
 
+from robot.errors import UnknownName
 from robot.records import Safety
+from server.web.api_models import Body
 from server.web.api_robot import ROBOT, STATE
 from server.web.device_schema import DevicesPart
 from server.web.devices_view import devices_view
-from server.web.services import AnyCaller, Operator, ServicesHere
+from server.web.refusals import NotSimulated
+from server.web.services import AnyCaller, Operator, Services, ServicesHere
 
 router = APIRouter(prefix=ROBOT, tags=["devices"])
 
@@ -53,4 +59,59 @@ async def take_hold(services: ServicesHere, caller: Operator) -> Response:
 async def reboot(services: ServicesHere, caller: Operator) -> Response:
     """For servos that took themselves out of service, as after an overload. Home afterwards."""
     await services.requests.ask_devices(services.link.reboot_devices, _STILL, "pause it first")
+    return services.state(caller)
+
+
+class FaultEntry(BaseModel):
+    """One fault that a simulated robot can be given."""
+
+    name: str
+    title: str
+    active: bool = Field(description="Whether it was injected last and not cleared since.")
+
+
+class FaultInjection(Body):
+    """A fault to inject."""
+
+    name: Annotated[str, Field(min_length=1, max_length=80)] = Field(
+        description="Name from GET faults.", examples=["servo-silent"]
+    )
+
+
+def _check_simulated(services: Services) -> None:
+    if services.configuration.hardware.connected:
+        raise NotSimulated
+
+
+@router.get("/faults", summary="Faults that a simulated robot can be given")
+async def faults(services: ServicesHere, _: AnyCaller) -> list[FaultEntry]:
+    """Empty for a real robot."""
+    from hardware.faulty_plant import FAULTS
+
+    if services.configuration.hardware.connected:
+        return []
+    active = services.requests.fault
+    return [
+        FaultEntry(name=name, title=fault.title, active=name == active)
+        for name, fault in FAULTS.items()
+    ]
+
+
+@router.post("/faults", summary="Break the simulated robot", responses=STATE)
+async def inject(body: FaultInjection, services: ServicesHere, caller: Operator) -> Response:
+    """It acts from the next tick on, in the place of the one before. 409 on a real robot."""
+    from hardware.faulty_plant import FAULTS
+
+    _check_simulated(services)
+    if body.name not in FAULTS:
+        raise UnknownName("fault", body.name, tuple(FAULTS))
+    await services.requests.inject_fault(body.name)
+    return services.state(caller)
+
+
+@router.delete("/faults", summary="Mend the simulated robot", responses=STATE)
+async def mend(services: ServicesHere, caller: Operator) -> Response:
+    """What the fault led to stays: reset, then enable. 409 on a real robot."""
+    _check_simulated(services)
+    await services.requests.inject_fault("")
     return services.state(caller)

@@ -46,6 +46,7 @@ class ControlRequests:
     def __init__(self, link: WebLink, source: StateSource, trocar: TrocarView) -> None:
         self._link, self._source, self._trocar = link, source, trocar
         self._settings_lock = asyncio.Lock()
+        self._fault = ("", 0)
 
     async def ask(self, request: Request) -> None:
         """Ask for a change of the safety state.
@@ -180,6 +181,16 @@ class ControlRequests:
         """
         self._source.fresh_record()
         await self._taken_in(self._link.inject_fault(name))
+        self._fault = (name, self._restarts())
+
+    @property
+    def fault(self) -> str:
+        """Name of the fault that was injected into the present control process, or empty."""
+        name, restarts = self._fault
+        return name if restarts == self._restarts() else ""
+
+    def _restarts(self) -> int:
+        return int(self._link.status()["control_restarts"])
 
     async def ask_devices(
         self, send: Callable[[], int], states: tuple[Safety, ...], what: str

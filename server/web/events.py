@@ -116,7 +116,7 @@ class WebEvents:
             return
         words = f"{by} tried to {act}"
         self.note(
-            "refused", f"refused: {words}: {refusal}", code=refusal.code, by=by,
+            "refused", f"refused: {words}", code=refusal.code, by=by, detail=str(refusal),
             method=asked.method, path=asked.path, address=asked.address, body=_body(asked.body),
             alike=held or None,
         )  # fmt: skip

@@ -256,6 +256,16 @@ class DevicesNotReady(WebRefusal):
         self.readiness = readiness
 
 
+class NotSimulated(WebRefusal):
+    """Faults are injected into simulated robots only."""
+
+    code = "not_simulated"
+    status = 409
+
+    def __init__(self) -> None:
+        super().__init__("this robot is real: it is not broken on purpose")
+
+
 class TrocarRefused(WebRefusal):
     """The shaft cannot be meant to go through a trocar at this place.
 
