@@ -73,6 +73,12 @@ def test_what_makes_no_sense_is_refused(text: str) -> None:
         wanted_faults("gremlins:for_ms=1")
 
 
+def test_every_fault_is_documented() -> None:
+    text = (ROOT / "docs" / "labs.md").read_text(encoding="utf-8")
+    section = text.partition("## A simulated arm controller")[2].partition("\n## ")[0]
+    assert [name for name in FAULTS if f"`{name}`" not in section] == []
+
+
 def test_the_control_channel_breaks_mends_and_tells(tmp_path: Path) -> None:
     path = tmp_path / "arm.control"
     with FakeArm(controller(), address(), path):
