@@ -2,11 +2,15 @@
 
 import { call, ROBOT } from "/assets/api.js";
 import { Boards } from "/assets/boards.js";
-import { byId, setText } from "/assets/dom.js";
+import { Devices } from "/assets/devices.js";
+import { byId, setData, setText } from "/assets/dom.js";
+import { Drawer } from "/assets/drawer.js";
+import { Events } from "/assets/events.js";
+import { HandOver } from "/assets/hand_over.js";
 import { GamepadLeader } from "/assets/gamepad.js";
 import { startKeys } from "/assets/keys.js";
 import { Motion } from "/assets/motion.js";
-import { refuse, showBanner, showLink } from "/assets/notices.js";
+import { refuse, showBanner, showLink, tell } from "/assets/notices.js";
 import { Numbers } from "/assets/numbers.js";
 import { showOperator, startOperator, whyNotDriving } from "/assets/operator.js";
 import { Paths } from "/assets/paths.js";
@@ -29,7 +33,7 @@ const LEADERS = { none: "none", gizmo: "gizmo", api_pose: "API, relative pose", 
 
 window.keyhole = { state: null };
 
-const stream = new StateStream({ onState: take, onLink, onProblem });
+const stream = new StateStream({ onState: take, onLink, onProblem, onNotice });
 const motion = new Motion(stream, take);
 const settings = new Settings();
 const boards = new Boards();
@@ -39,19 +43,25 @@ const traces = new Traces();
 const numbers = new Numbers();
 const recording = new Recording();
 const replay = new Replay();
+const devices = new Devices(take);
+const handOver = new HandOver();
+const events = new Events();
+const drawer = new Drawer({ devices: () => devices.opened(), events: () => events.opened() }, () => events.closed());
+const failed = new Set();
 let shown = 0;
 let urgent = "";
 let configured = false;
 
 /** What must be on the page at once; the rest follows within 100 ms. */
-const urgencyOf = ({ safety, operator, engaged, path, control }) =>
-  [safety.state, safety.reason_code, operator.name, operator.you, engaged, path?.name, control].join();
+const urgencyOf = ({ safety, operator, engaged, path, control, readiness }) =>
+  [safety.state, safety.reason_code, ...Object.values(operator).slice(0, 2), engaged, path?.name, control, readiness.state,
+    operator.offered_to, operator.asked_by].join();
 
 function take(state) {
   if (isLate(state, window.keyhole.state)) return;
   window.keyhole.state = state;
   stream.driving = state.operator.you;
-  if (state.time_s !== null) traces.take(state);
+  if (state.time_s !== null) guarded("plots", () => traces.take(state));
   const urgency = urgencyOf(state);
   if (urgency !== urgent || performance.now() - shown >= SHOW_MS) show();
   urgent = urgency;
@@ -66,26 +76,46 @@ function show() {
   if (state === null) return;
   shown = performance.now();
   const blocked = whyNotDriving(state, stream.up);
-  showSafety(state, stream.up);
-  showFacts(state, shown - stream.lastMessage);
-  showOperator(state, stream.up);
-  recording.show(state, stream.up);
-  replay.show(state, stream.up);
-  showBanner(state);
-  settings.show(state, blocked);
-  motion.show(state, blocked, stream.up);
-  paths.show(state, blocked);
-  boards.show(state, blocked, paths.needed);
-  trocar.show(state, blocked);
-  showTask(state);
-  numbers.show(state);
-  showLeader(state);
+  const parts = {
+    safety: () => showSafety(state, stream.up),
+    facts: () => showFacts(state, shown - stream.lastMessage),
+    operator: () => showOperator(state, stream.up),
+    banner: () => showBanner(state),
+    motion: () => motion.show(state, blocked, stream.up),
+    "hand-over": () => handOver.show(state, stream.up),
+    recording: () => recording.show(state, stream.up),
+    replay: () => replay.show(state, stream.up),
+    settings: () => settings.show(state, blocked),
+    paths: () => paths.show(state, blocked),
+    boards: () => boards.show(state, blocked, paths.needed),
+    trocar: () => trocar.show(state, blocked),
+    devices: () => devices.show(state, blocked),
+    task: () => showTask(state),
+    numbers: () => numbers.show(state),
+    leader: () => showLeader(state),
+  };
+  for (const [name, act] of Object.entries(parts)) guarded(name, act);
+}
+
+/** A part that fails must not take the others with it: it is told once, here and in the server's log. */
+function guarded(name, act) {
+  try {
+    act();
+  } catch (error) {
+    if (failed.has(name)) return;
+    failed.add(name);
+    const words = `${name}: ${error}`.slice(0, 300);
+    tell(`A part of this page failed (${words}). The rest and the robot go on; reload the page.`, "error");
+    stream.send({ type: "page-error", words });
+  }
 }
 
 function showLeader({ leader, engaged, plant, preset, seed }) {
   setText(byId("leader"), LEADERS[leader] ?? leader);
   setText(byId("engaged"), engaged ? "· engaged" : "· not engaged");
-  setText(byId("plant"), `· ${plant} robot${preset === null ? "" : `: ${preset}, seed ${seed}`}`);
+  const robot = `${plant} robot${preset === null ? "" : `: ${preset}, seed ${seed}`}`;
+  setText(byId("plant"), `· ${robot}`);
+  setData(byId("leader-words"), "tip", `Who leads the tip, and whether it follows. ${robot[0].toUpperCase()}${robot.slice(1)}`);
 }
 
 function onLink(change) {
@@ -101,6 +131,10 @@ function onLink(change) {
 /** Who drives is on the page already. */
 function onProblem({ code, detail }) {
   if (code !== "not_the_operator") refuse(detail);
+}
+
+function onNotice({ kind, text }) {
+  tell(text, kind === "info" ? "info" : "error");
 }
 
 async function configure() {

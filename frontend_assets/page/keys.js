@@ -26,6 +26,8 @@ const KEYS = [
   { key: "k", show: "K", words: "Play or stop the path; play or pause a replay", press: ["replay-play", "stop-path", "play"] },
   { key: "l", show: "L", words: "Start or stop recording", press: ["record"] },
   { key: "b", show: "B", words: "Straighten and withdraw", press: ["withdraw"] },
+  { key: "i", show: "I", words: "Devices: open or close", press: ["show-devices"] },
+  { key: "j", show: "J", words: "Events: open or close", press: ["show-events"] },
   { key: "f", show: "F", words: "Freeze the plots", press: ["freeze"] },
   { key: "z", show: "Z", words: "Time window of the plots", other: "window" },
   { key: "n", show: "N", words: "Light or dark", press: ["theme"] },

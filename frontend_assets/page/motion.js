@@ -2,6 +2,7 @@
 
 import { call, ROBOT } from "/assets/api.js";
 import { byId, onPress, setBlocked, setData, setText } from "/assets/dom.js";
+import { sentence } from "/assets/format.js";
 import { attempt, refuse } from "/assets/notices.js";
 import { REPLAY_WORDS } from "/assets/replay.js";
 
@@ -25,6 +26,20 @@ const SENSELESS = {
 
 /** What a person most likely wants to press next. */
 const NEXT = { DISABLED: "enable", PAUSED: "enable", FAULT: "reset" };
+
+/** What stands against enabling beside the state and who drives, or "". */
+function whyNotEnabled({ readiness, operator }) {
+  if (operator.offered_to) return `Control is offered to ${operator.offered_to}: withdraw the offer first.`;
+  return readiness.state === "ready" ? "" : wordsOf(readiness);
+}
+
+const wordsOf = ({ reason, action }) => `${sentence(reason)} ${sentence(action)}`.trim();
+
+function showReadiness(readiness, known) {
+  const ready = readiness.state === "ready";
+  setData(byId("readiness"), "level", !known ? "none" : ready ? "ok" : readiness.state === "busy" ? "busy" : "warn");
+  setText(byId("readiness-words"), !known ? "Devices: not known" : ready ? "Devices ready" : wordsOf(readiness));
+}
 
 export class Motion {
   /** `stream`: the WebSocket, which is faster than a request; `take(state)`: newest state. */
@@ -97,11 +112,13 @@ export class Motion {
   /** `blocked`: why this page may not drive, or "". */
   show(state, blocked, up) {
     const name = state.safety.state;
+    showReadiness(state.readiness, up && !state.replay);
     for (const request of REQUESTS) {
       const open = request === "pause" && up && !state.replay;
       const senseless = SENSELESS[request][name] ?? "";
-      setBlocked(byId(request), senseless || (open ? "" : blocked));
-      byId(request).classList.toggle("next", NEXT[name] === request && !blocked);
+      const unready = request === "enable" && !blocked ? whyNotEnabled(state) : "";
+      setBlocked(byId(request), senseless || (open ? "" : blocked) || unready);
+      byId(request).classList.toggle("next", NEXT[name] === request && !blocked && !unready);
     }
     this.#showHoldable(state, blocked);
     setText(byId("watcher-note"), blocked);

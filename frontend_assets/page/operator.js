@@ -24,9 +24,23 @@ export function startOperator() {
   });
 }
 
+/** Whether somebody else drives who would have to be asked. */
+let mustAsk = false;
+
 async function take() {
-  const lease = await attempt(call("POST", `${ROBOT}/lease`, { operator: byId("operator-name").value }));
+  if (mustAsk) {
+    askFor(myName());
+    return;
+  }
+  const lease = await attempt(call("POST", `${ROBOT}/lease`, { operator: myName() }));
   if (lease) actUnder(lease.lease_id);
+}
+
+export const myName = () => byId("operator-name").value;
+
+async function askFor(operator) {
+  const asked = await attempt(call("POST", `${ROBOT}/lease/request`, { operator }).then(() => true));
+  if (asked) tell("You asked for control. The operator sees it and answers.");
 }
 
 async function release() {
@@ -38,7 +52,7 @@ async function handOver(to) {
   const answer = await attempt(call("POST", `${ROBOT}/lease/hand-over`, { to }).then(() => true));
   if (!answer) return;
   byId("operator-popover").hidePopover();
-  tell(`Control is offered to ${to}.`);
+  tell(`Control is offered to ${to}. Nothing moves until it is taken or withdrawn.`);
 }
 
 /** Why this page may not drive now, or "". */
@@ -52,14 +66,18 @@ export function whyNotDriving(state, up) {
 }
 
 export function showOperator({ operator, replay }, up) {
-  const { name, you } = operator;
+  const { name, you, offered_to } = operator;
+  mustAsk = Boolean(name) && !you && offered_to !== myName();
+  const button = byId("take-control");
+  setText(button, mustAsk ? "Ask for control" : "Take control");
+  setData(button, "tip", mustAsk ? `Ask ${name} for control: only one person drives at a time (C)` : "Become the operator: only one person drives at a time (C)");
   const who = you ? `as ${name}` : name ? `${name} drives` : "No one drives";
   setText(byId("operator-role"), !up ? "Not connected" : you ? "You drive" : "Watching");
   setText(byId("operator-who"), up ? who : "");
   setData(byId("operator-who"), "tip", who);
   setHidden(byId("take-control"), you);
   setHidden(byId("release-control"), !you);
-  byId("take-control").classList.toggle("primary", !name);
+  button.classList.toggle("primary", !mustAsk);
   const offline = !up ? "No connection to the server." : replay ? REPLAY_WORDS : "";
   setBlocked(byId("take-control"), offline);
   setBlocked(byId("release-control"), offline);

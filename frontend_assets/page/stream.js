@@ -13,12 +13,14 @@ const ASLEEP_MS = 1000;
 export class StateStream {
   /**
    * `onState(message)` for every state; `onLink({up, reason, retryAt})` when the link changes;
-   * `onProblem(problem)` for a message of ours that the server refused.
+   * `onProblem(problem)` for a message of ours that the server refused; `onNotice({kind, text})`
+   * for what else the server tells.
    */
-  constructor({ onState, onLink, onProblem }) {
+  constructor({ onState, onLink, onProblem, onNotice }) {
     this.onState = onState;
     this.onLink = onLink;
     this.onProblem = onProblem;
+    this.onNotice = onNotice;
     this.socket = null;
     this.up = false;
     this.holding = false;
@@ -67,6 +69,7 @@ export class StateStream {
       this.onLink({ up: true, reason: "", retryAt: 0 });
     }
     if (message.type === "problem") this.onProblem(message.problem);
+    if (message.type === "notice") this.onNotice(message);
     if (message.type !== "state") return;
     this.tick = message.tick;
     this.onState(message);

@@ -5,10 +5,22 @@ import { fixed, percent } from "/assets/format.js";
 
 const NEAR = 0.75;
 
-export function showTask({ contact, rings, ball, control }) {
+/** The smallest distance between arm, module, shaft and body wall. */
+function showClearance({ distance_mm, between, limit_mm }) {
+  const known = distance_mm !== null;
+  setHidden(byId("clearance"), !known);
+  if (!known) return;
+  const level = distance_mm < limit_mm ? "over" : distance_mm < 2 * limit_mm ? "near" : "none";
+  setData(byId("clearance"), "level", level);
+  setText(byId("clearance-text"), `Clearance ${fixed(distance_mm, distance_mm < 99.5 ? 1 : 0)} mm`);
+  setData(byId("clearance"), "tip", `Between ${between}. Below ${fixed(limit_mm, 1)} mm the motion pauses`);
+}
+
+export function showTask({ contact, clearance, rings, ball, control }) {
   const known = control === "running";
   setHidden(byId("task"), !known);
   if (!known) return;
+  showClearance(clearance);
   const level = levelOf(contact);
   setData(byId("contact"), "level", level);
   setText(byId("contact-text"), wordsOf(contact, level));

@@ -35,6 +35,11 @@ READINESS: dict[Readiness, tuple[str, str]] = {
 """For each readiness: what stands against enabling, and what to do."""
 
 
+_NOT_READ = dict.fromkeys(
+    ("position_deg", "load_percent", "voltage_v", "temperature_c", "age_ms"), math.nan
+)
+
+
 def readiness_view(value: int) -> dict[str, str]:
     """Readiness as the state message tells it."""
     readiness = Readiness(value) if value in set(Readiness) else Readiness.BUSY
@@ -91,16 +96,19 @@ def _bus(bus: np.void) -> dict[str, Any]:
 def _servo(servo: np.void) -> dict[str, Any]:
     bits = int(servo["hardware_error"])
     identity = int(servo["id"])
+    # A servo that has never answered has told nothing, and its zeros are none.
+    known = bool(servo["answers"]) or float(servo["voltage_v"]) > 0.0
+    read = servo if known else _NOT_READ
     return {
         "id": identity,
         "answers": bool(servo["answers"]),
         "torque": bool(servo["torque"]),
-        "firmware": int(servo["firmware"]),
-        "position_deg": _rounded(float(servo["position_deg"]), 2),
-        "load_percent": _rounded(float(servo["load_percent"]), 1),
-        "voltage_v": _rounded(float(servo["voltage_v"]), 1),
-        "temperature_c": _rounded(float(servo["temperature_c"]), 1),
-        "age_ms": _rounded(float(servo["age_ms"]), 1),
+        "firmware": int(servo["firmware"]) if known else None,
+        "position_deg": _rounded(float(read["position_deg"]), 2),
+        "load_percent": _rounded(float(read["load_percent"]), 1),
+        "voltage_v": _rounded(float(read["voltage_v"]), 1),
+        "temperature_c": _rounded(float(read["temperature_c"]), 1),
+        "age_ms": _rounded(float(read["age_ms"]), 1),
         "error": fault_message(identity, HardwareError(bits)) if bits else None,
     }
 

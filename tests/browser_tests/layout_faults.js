@@ -35,7 +35,7 @@
   });
 
   const seenOf = (element, box) => shared(box, windowOf(element.parentElement));
-  const scrolls = (element) => element.closest(".left-scroll, .numbers, dialog") !== null;
+  const scrolls = (element) => element.closest(".left-scroll, .numbers, .drawer-scroll, dialog") !== null;
   const cutsOnPurpose = (element) => {
     const style = getComputedStyle(element);
     return style.textOverflow === "ellipsis" || style.webkitLineClamp !== "none";
@@ -138,7 +138,7 @@
 
   if (document.documentElement.scrollWidth > innerWidth) faults.push("the page scrolls sideways");
   if (document.documentElement.scrollHeight > innerHeight) faults.push("the page scrolls");
-  for (const pane of document.querySelectorAll(".left-scroll, .numbers")) {
+  for (const pane of document.querySelectorAll(".left-scroll, .numbers, .drawer-scroll")) {
     if (pane.scrollWidth > pane.clientWidth) faults.push(`scrolls sideways: .${pane.className}`);
   }
   cutText();
