@@ -6,11 +6,13 @@ import contextlib
 import math
 import re
 import subprocess
+import time
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from hardware.fake_servos.client import FakeServos
+from hardware.fake_servos.client import FakeServos, FakeServosFailed
+from hardware.fake_servos.program import control_path
 from scenes.path_file import HEADER
 from server.faults.fault import BenchFailed
 from server.supervision.child_process import module_command, module_environment
@@ -47,7 +49,7 @@ class StylusProcess:
         path, name = self._folder / "stylus.csv", self._folder / "stylus"
         path.write_text(_circle(), encoding="utf-8")
         arguments = ["fake-stylus", "--listen", "ws://127.0.0.1:0", "--manual"]
-        arguments += ["--path", str(path), "--control", f"{name}.control"]
+        arguments += ["--path", str(path), "--control", str(control_path(name))]
         self._process = subprocess.Popen(
             module_command("server.command_line", arguments),
             stdout=subprocess.PIPE,
@@ -61,7 +63,11 @@ class StylusProcess:
             self._end()
             raise BenchFailed(f"the simulated stylus did not start: {line.strip()}")
         self.address = found[0]
-        self.channel = FakeServos(name)
+        try:
+            self.channel = self._channel(name)
+        except BaseException:
+            self._end()
+            raise
         return self
 
     def __exit__(
@@ -72,6 +78,18 @@ class StylusProcess:
     ) -> None:
         self.channel.close()
         self._end()
+
+    @staticmethod
+    def _channel(name: Path) -> FakeServos:
+        """Its control channel, which it opens a little later than its port."""
+        ends = time.monotonic() + _END_S
+        while True:
+            try:
+                return FakeServos(name)
+            except FakeServosFailed:
+                if time.monotonic() > ends:
+                    raise
+                time.sleep(0.02)
 
     def _end(self) -> None:
         self._process.terminate()
