@@ -47,8 +47,8 @@ def allowed(schema: Schema, root: Schema) -> st.SearchStrategy[Any]:
         return _objects(schema, root)
     if kind == "array":
         return _arrays(schema, root)
-    low = float(schema.get("minimum", schema.get("exclusiveMinimum", -1e4)))
-    high = float(schema.get("maximum", schema.get("exclusiveMaximum", 1e4)))
+    low: Any = schema.get("minimum", schema.get("exclusiveMinimum", -1e4))
+    high: Any = schema.get("maximum", schema.get("exclusiveMaximum", 1e4))
     simple: dict[Any, st.SearchStrategy[Any]] = {
         "number": st.floats(low, high, allow_nan=False),
         "integer": st.integers(int(low), int(high)),
