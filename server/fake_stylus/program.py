@@ -23,8 +23,8 @@ from server.fake_stylus.wording import OwnWording, RosWording, as_null, number
 from server.leaders.connection import wait
 
 RATE_HZ = 500.0
-BUTTONS_EVERY = 4
-"""A driver that repeats its buttons does so with every fourth pose."""
+BUTTONS_EVERY = 3
+"""A driver that repeats its buttons does so with every third pose."""
 
 _LOGGED = 20_000
 _ROWS = 5000

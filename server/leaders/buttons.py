@@ -21,6 +21,7 @@ _MODES = {"both": DriveMode.BOTH, "arm": DriveMode.ARM, "segment": DriveMode.SEG
 _REPEATS_KNOWN = 3
 _LONGEST_REPEAT_NS = 500_000_000
 _ALLOWED_REPEATS = 3.0
+_SHARE_OF_TIMEOUT = 0.8
 
 
 class ButtonScheme:
@@ -48,7 +49,7 @@ class ButtonWatch:
     """The newest state of the buttons, and until when it counts. Times in ns, one clock.
 
     Args:
-        timeout_ns: silence that is never taken for death.
+        timeout_ns: within which control shall know that they are dead.
 
     Attributes:
         bits: the newest state.
@@ -75,5 +76,7 @@ class ButtonWatch:
             return False
         silent_ns = now_ns - self.heard_ns
         if self.repeats:
-            return silent_ns > max(self._timeout_ns, _ALLOWED_REPEATS * max(self._gaps))
+            # Early enough for control to know of it within the time-out.
+            shortest_ns = _SHARE_OF_TIMEOUT * self._timeout_ns
+            return silent_ns > max(shortest_ns, _ALLOWED_REPEATS * max(self._gaps))
         return silent_ns > LONGEST_PRESS_S * 1e9

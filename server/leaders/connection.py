@@ -79,7 +79,7 @@ class Connection:
         """
         if self._unsent:
             self._flush()
-        if self._unsent or self.closed:
+        if self._unsent or not self._is_open():
             return False
         self._protocol.send_text(text)
         self._flush()
@@ -87,7 +87,7 @@ class Connection:
 
     def ping(self) -> None:
         """Ask the other end for a sign of life."""
-        if not self.closed and not self._unsent:
+        if self._is_open() and not self._unsent:
             self._protocol.send_ping(b"")
             self._flush()
 
@@ -107,9 +107,15 @@ class Connection:
             self._protocol.receive_eof()
         messages = self.take()
         self._flush()
-        if not data or self._protocol.state is State.CLOSED:
-            self._end(self._protocol.close_reason or "the other end has closed the connection")
+        if not data:
+            self._end("the other end has hung up")
+        self._is_open()
         return messages
+
+    def _is_open(self) -> bool:
+        if not self.closed and self._protocol.state is not State.OPEN:
+            self._end(self._protocol.close_reason or "the other end has closed the connection")
+        return not self.closed
 
     def take(self) -> list[bytes]:
         """The messages that were read together with something else."""
