@@ -84,7 +84,9 @@ class ArmSession:
     def close(self) -> None:
         """Disconnect."""
         if self._api is not None:
-            self._api.disconnect()
+            # What is left of a connection that broke may fail in any way.
+            with contextlib.suppress(Exception):
+                self._api.disconnect()
             self._api = None
 
     def codes(self) -> tuple[int, int]:

@@ -136,6 +136,9 @@ class ArmWorker:
                 self._attend()
             except (ArmUnreachable, WrongArm) as error:
                 self._say(str(error))
+            except Exception as error:
+                # The vendor's library raises whatever comes of an answer that it did not expect.
+                self._say(f"the arm's library failed, connecting anew: {error!r}")
             self._lose()
             if not self._ending:
                 self._rest(_RETRY_S)

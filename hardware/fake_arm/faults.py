@@ -48,6 +48,7 @@ FAULTS: dict[str, Fault] = {
     "silent": Fault("neither answers nor reports come; the connections stay", 0, True),
     "no-reports": Fault("reports stop, answers come", 0, True),
     "slow": Fault("every answer comes 0.2 s late", 0, True),
+    "short-answers": Fault("answers come without their data", 0, True),
     "wrong-report": Fault("reports come with a length that cannot be", 0, True),
     "not-a-number": Fault("reports say that joint 2 stands at no number", 0, True),
 }

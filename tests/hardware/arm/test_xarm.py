@@ -232,6 +232,25 @@ def test_a_lost_connection_comes_back_standing(rig: Rig, name: str) -> None:
     rig.until(rig.arrived(rig.move(0.02, 20)))
 
 
+def test_an_answer_that_the_library_cannot_read_does_not_end_the_thread(rig: Rig) -> None:
+    rig.fake.inject("short-answers")
+    rig.until(lambda: rig.reading() == (Event.ARM_LOST, Readiness.NOT_CONNECTED))
+    rig.fake.clear("short-answers")
+    rig.until_ready()
+    rig.until(rig.arrived(rig.move(0.02, 20)))
+
+
+def test_a_slow_controller_is_told_and_moves_the_arm_no_faster(rig: Rig) -> None:
+    rig.fake.inject("slow")
+    rig.reading()
+    begin = rig.q.copy()
+    for tick in range(300):
+        rig.write(begin + np.eye(7)[0] * 0.02 * tick / 300)
+    rig.until(lambda: "answers late" in rig.message())
+    assert rig.fake.controller.error == 0
+    rig.fake.clear("slow")
+
+
 def test_joints_that_are_no_numbers_are_not_taken(rig: Rig) -> None:
     rig.fake.inject("not-a-number")
     rig.until(lambda: rig.reading()[0] == Event.ARM_LOST)
