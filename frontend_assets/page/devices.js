@@ -93,7 +93,8 @@ export class Devices {
     showFacts(byId("bus-facts"), BUS_FACTS, bus);
     showFacts(byId("arm-facts"), ARM_FACTS, arm);
     if (bus) this.#showServos(bus.servos);
-    showFaults([bus?.message, arm?.message, ...(bus?.servos ?? []).map((servo) => servo.error)]);
+    const messages = [bus, arm].map((device) => [device?.message, device?.state === "fault" || device?.state === "searching"]);
+    showFaults([...messages, ...(bus?.servos ?? []).map((servo) => [servo.error, true])]);
   }
 
   #showServos(servos) {
@@ -127,15 +128,16 @@ function showFacts(list, facts, source) {
   setHidden(list, !source);
   if (!source) return;
   if (!list.childElementCount) {
-    for (const [name, , tip] of facts) {
+    for (const [name] of facts) {
       const row = make("div", "device-fact");
-      row.dataset.tip = tip;
       row.append(make("dt", "", name), make("dd"));
       list.append(row);
     }
   }
-  facts.forEach(([, words], index) => {
-    setText(list.children[index].lastChild, words(source));
+  facts.forEach(([, words, tip], index) => {
+    const value = words(source);
+    setText(list.children[index].lastChild, value);
+    setData(list.children[index], "tip", `${tip}: ${value}`);
     // Of what is simulated there is nothing else to tell.
     setHidden(list.children[index], index > 0 && source.state === "simulated");
   });
@@ -174,12 +176,13 @@ function showServo(row, servo) {
   setData(row, "tip", `Servo ${servo.id}, firmware ${servo.firmware ?? "not known"}, last answer ${fixed(servo.age_ms, 0)} ms ago${servo.error ? `. ${sentence(servo.error)}` : ""}`);
 }
 
-/** What devices report, in words; nothing where all is well. */
+/** What devices report, [words, whether it is grave]; nothing where there is nothing to tell. */
 function showFaults(messages) {
-  const words = [...new Set(messages.filter(Boolean).map(sentence))];
+  const told = new Map(messages.filter(([words]) => words).map(([words, grave]) => [sentence(words), grave]));
   const list = byId("device-faults");
-  setHidden(list, words.length === 0);
-  if (list.dataset.words === words.join("\n")) return;
-  list.dataset.words = words.join("\n");
-  list.replaceChildren(...words.map((text) => make("li", "", text)));
+  setHidden(list, told.size === 0);
+  const known = JSON.stringify([...told]);
+  if (list.dataset.words === known) return;
+  list.dataset.words = known;
+  list.replaceChildren(...[...told].map(([words, grave]) => make("li", grave ? "grave" : "", words)));
 }

@@ -105,6 +105,11 @@ def test_nothing_overlaps_is_cut_or_pale(
     assert operator.call("POST", "/path", {"experiment": "circle"}) == 200
     eventually(lambda: operator.shown()["path"], "a path plays", SLOW_S)
     assert layout_faults(page) == []
+    for pane in ("Devices", "Events"):
+        operator.button(pane).click()
+        expect(page.get_by_role("region", name=pane)).to_be_visible()
+        assert layout_faults(page) == []
+        operator.button(pane).click()
     operator.button("Help").click()
     expect(page.locator("#help-dialog")).to_be_visible()
     assert layout_faults(page) == []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from playwright.sync_api import BrowserContext, expect
@@ -34,8 +36,12 @@ def test_a_second_browser_watches_and_cannot_drive(
     for control in page.locator("input.drive, select.drive").all():
         expect(control).to_be_disabled()
     expect(page.locator("#emergency-stop")).to_be_enabled()
-    watcher.button("Take control").click()
-    expect(page.get_by_role("alert").filter(has_text=name)).to_be_visible()
+    watcher.button("Ask for control").click()
+    asks = operator.page.locator("#hand-over-title")
+    expect(asks).to_contain_text("asks for control")
+    operator.page.get_by_role("button", name="Decline").click()
+    expect(asks).to_be_hidden()
+    expect(page.locator("#operator-role")).to_have_text("Watching")
 
     start, drawn = tip_of(console.state()), np.array(watcher.gizmo_mm())
     x, y = watcher.pixel(0, 0.053)
@@ -80,3 +86,42 @@ def test_the_api_refuses_a_watcher_to_drive(
     assert state["safety"]["state"] == "ENABLED", state["safety"]
     assert state["priority"]["case"] == "1"
     assert operator.shown()["operator"]["you"]
+
+
+def test_control_goes_from_browser_to_browser_in_sight_of_both(
+    operator: ConsolePage, watcher: ConsolePage, console: ConsoleProcess
+) -> None:
+    operator.settle()
+    watcher.button("Ask for control").click()
+    expect(watcher.page.locator("#hand-over-title")).to_contain_text("You asked")
+    operator.page.locator("#hand-over-yes").click()
+    expect(operator.page.locator("#hand-over-title")).to_contain_text("Control is offered to")
+    operator.until("PAUSED")
+    enable = operator.button("Enable")
+    expect(enable).to_have_attribute("data-why", re.compile("withdraw the offer"))
+    watcher.button("Take over").click()
+    expect(watcher.page.locator("#operator-role")).to_have_text("You drive")
+    expect(operator.page.locator("#operator-role")).to_have_text("Watching")
+    assert console.state()["safety"]["state"] == "PAUSED"
+    watcher.enable()
+    watcher.button("Release").click()
+
+
+def test_a_fault_can_be_tried_and_stands_among_the_events(
+    operator: ConsolePage, console: ConsoleProcess
+) -> None:
+    page = operator.page
+    operator.button("Devices").click()
+    expect(operator.button("Home")).to_have_attribute("data-why", re.compile("simulated"))
+    page.locator("#fault").select_option("bus-lost")
+    page.locator("#fault-inject").click()
+    operator.until("PAUSED")
+    expect(page.locator("#readiness")).to_contain_text("A device is not connected.")
+    expect(operator.button("Enable")).to_have_attribute("aria-disabled", "true")
+    page.locator("#fault-mend").click()
+    expect(page.locator("#readiness")).to_contain_text("Devices ready")
+    page.keyboard.press("j")
+    expect(page.locator("#events li").filter(has_text="the servo bus is gone")).to_have_count(1)
+    page.keyboard.press("j")
+    operator.enable()
+    assert console.state()["safety"]["state"] == "ENABLED"
