@@ -21,7 +21,7 @@ from hardware.arm.errors import ArmLibraryMissing, ArmUnreachable, WrongArm
 AXES = 7
 ANSWER_MS = 500
 SERVO_MODE = 1
-READY_STATES = (1, 2)
+READY_STATES = (0, 1, 2)
 STOPPED_STATE = 4
 COLLISION_SENSITIVITY = 3
 _QUIETED = ("xarm.x3.base", "xarm.core.wrapper.uxbus_cmd_tcp")
@@ -100,7 +100,7 @@ class ArmSession:
         return int(found[0]), int(found[1])
 
     def state(self) -> int:
-        """The controller's state now: 1 moving, 2 ready, 3 paused, 4 stopped.
+        """The controller's state now: 0 to 2 moving or ready, 3 paused, 4 stopped.
 
         Raises:
             ArmUnreachable: if there is no answer.

@@ -20,6 +20,7 @@ _RETRY_S = 0.5
 _LOOK_NS = 50_000_000
 _LATE_NS = 50_000_000
 _REST_S = 0.01
+_TRIES, _TRY_S = 20, 0.05
 _ENDING_S = 3.0
 
 
@@ -226,7 +227,7 @@ class ArmWorker:
                 self._fail(error_message(error))
         elif self.stage == Stage.READY:
             state = self._session.state()
-            if state not in READY_STATES and state != 0:
+            if state not in READY_STATES:
                 self._fail("somebody else stopped the arm; reboot the devices to go on")
             elif self.warning:
                 self._say(warning_message(self.warning))
@@ -259,7 +260,10 @@ class ArmWorker:
         self._say("opening the brakes and entering servo mode")
         self._session.prepare(self._settings.mass_kg, list(self._settings.centre_mm))
         self.error, self.warning = self._session.codes()
-        state = self._session.state()
+        state, tries = self._session.state(), 0
+        while not self.error and state not in READY_STATES and tries < _TRIES and not self._ending:
+            time.sleep(_TRY_S)
+            state, tries = self._session.state(), tries + 1
         if self.error:
             self._fail(error_message(self.error))
         elif state not in READY_STATES:
