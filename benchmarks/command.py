@@ -14,6 +14,7 @@ from server.configuration_file import load
 BENCHMARKS = {
     "tick": ("benchmarks.tick", "the controller tick beside a pink step"),
     "plant": ("benchmarks.plant", "the simulated robot beside its bare engine"),
+    "hardware": ("benchmarks.hardware", "servo bus and stylus, from the hand to the servos"),
     "loop": ("benchmarks.loop_lateness", "lateness of the control process beside an empty loop"),
 }
 """Names, modules with ``measure(configuration, seconds)``, titles."""

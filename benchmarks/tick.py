@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Any
 from unittest import mock
@@ -34,9 +34,9 @@ from server.control.loop import ControlLoop
 _WARM_UP = 500
 
 
-def percentiles(nanoseconds: list[int]) -> dict[str, float]:
+def percentiles(nanoseconds: Sequence[int] | np.ndarray) -> dict[str, float]:
     """Median and 99th percentile in microseconds."""
-    values = np.array(nanoseconds) * 1e-3
+    values = np.asarray(nanoseconds) * 1e-3
     return {"p50": float(np.percentile(values, 50)), "p99": float(np.percentile(values, 99))}
 
 
