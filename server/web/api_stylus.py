@@ -154,8 +154,8 @@ class BridgeClient:
             # Zero is repeated now and then, so that a bridge can tell that somebody listens.
             if force != NO_FORCE or sent != NO_FORCE or silent >= _EVERY:
                 x, y, z = force
-                text = f'{{"force_n":[{x:.5f},{y:.5f},{z:.5f}],"engaged":{_BOOLEAN[engaged]}}}'
-                await self._websocket.send_text(text)
+                words = f'"force_n":[{x:.5f},{y:.5f},{z:.5f}],"engaged":{_BOOLEAN[engaged]}'
+                await self._websocket.send_text(f'{{"type":"force",{words}}}')
                 sent, silent = force, 0
             await self._tell_problem()
 

@@ -16,9 +16,10 @@ def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ConsoleProcess
     """Supervisor, control and web, running; patient with leaders, for the machine may be busy."""
     folder = tmp_path_factory.mktemp("console")
     text = (resources.files("robot") / "keyhole.toml").read_text()
-    patient = text.replace("api_timeout_ms = 25.0", "api_timeout_ms = 1500.0")
+    # Of the API's poses and of a stylus.
+    patient = text.replace("timeout_ms = 25.0", "timeout_ms = 1500.0")
     patient = patient.replace("gizmo_timeout_ms = 120.0", "gizmo_timeout_ms = 1500.0")
-    assert patient.count("= 1500.0") == 2
+    assert patient.count("= 1500.0") == 3
     config = folder / "patient.toml"
     config.write_text(patient)
     with ConsoleProcess(folder, "--config", str(config), "--plant", "kinematic") as running:

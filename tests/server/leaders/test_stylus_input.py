@@ -215,22 +215,23 @@ def test_a_driver_that_tells_changes_leads_with_its_first_press(
     assert stylus.counts.buttons_dead == 0
 
 
-def test_what_is_known_of_control(directory: object, control: ControlSide) -> None:
+@pytest.mark.parametrize(
+    ("safety", "age_s", "lives", "enabled"),
+    [
+        (Safety.ENABLED, 0.0, True, True),
+        (Safety.PAUSED, 0.0, True, False),
+        (Safety.ENABLED, 0.2, False, False),
+        (None, 0.0, False, False),
+    ],
+)
+def test_what_is_known_of_control(
+    control: ControlSide, safety: Safety | None, age_s: float, lives: bool, enabled: bool
+) -> None:
     view = ControlView(control.directory)
+    if safety is not None:
+        control.say(safety, age_s=age_s)
     view.update(time.monotonic_ns())
-    assert not view.lives
-    control.say(Safety.ENABLED)
-    view.update(time.monotonic_ns())
-    assert view.lives
-    assert view.enabled
-    control.say(Safety.PAUSED)
-    view.update(time.monotonic_ns())
-    assert view.lives
-    assert not view.enabled
-    control.say(Safety.ENABLED, age_s=0.2)
-    view.update(time.monotonic_ns())
-    assert not view.lives
-    assert not view.enabled
+    assert (view.lives, view.enabled) == (lives, enabled)
     view.close()
 
 
