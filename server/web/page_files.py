@@ -50,6 +50,8 @@ text. The client may send
 - `{"type":"leader","position_mm":[0,0,0],"orientation_wxyz":[1,0,0,0],"clutch":true}`
 - `{"type":"emergency-stop"}`
 
+- `{"type":"page-error","words":"..."}`: a part of the page failed, for the audit log
+
 A message that is refused is answered by `{"type":"problem","problem":{...}}`. When the operator's
 stream is closed, or heartbeats stop for 1 s, the robot pauses.
 
