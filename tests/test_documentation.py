@@ -66,7 +66,7 @@ def _allowed(schema: dict[str, Any]) -> str:
     if "const" in schema:
         return str(schema["const"])
     if "enum" in schema:
-        return ", ".join(schema["enum"])
+        return ", ".join(str(one) for one in schema["enum"])
     if "prefixItems" in schema:
         (each,) = {_allowed(item) for item in schema["prefixItems"]}
         words = f"{len(schema['prefixItems'])} numbers"
