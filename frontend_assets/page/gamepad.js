@@ -23,7 +23,7 @@ export class GamepadLeader {
     const pad = [...navigator.getGamepads()].find((one) => one?.connected && one.axes.length >= 4);
     // A gamepad that is gone while it leads falls silent, which pauses the robot.
     if (!pad) {
-      this.#show(this.held ? "the gamepad is gone" : "");
+      this.#show("");
       this.held = 0;
       return;
     }
