@@ -102,6 +102,8 @@ class ControlLoop:
         self._path_start_rotation = np.zeros((3, 3))
         self._path_sample = np.zeros(7)
         self._dt_ns = plant.spec.tick_ns
+        hardware = configuration.hardware
+        self._arm_is_locked = hardware.connected and hardware.arm == "locked"
         self._views()
         header = self._header
         header["schema_version"] = SCHEMA_VERSION
@@ -261,6 +263,8 @@ class ControlLoop:
                 tick_input["settings"]["lock_arm"] = 1
         else:
             tick_input["leader"] = self.leader[0]
+        if self._arm_is_locked:
+            tick_input["settings"]["lock_arm"] = 1
         self.request = Request.NONE
 
     def _measure(self) -> None:

@@ -105,3 +105,18 @@ def test_the_errors_of_a_path_are_against_the_path_where_speed_limits_make_the_t
     error = loop.record["truth"]["position_error"][0]
     assert error == pytest.approx(np.linalg.norm(desired - loop.record["truth"]["position"][0]))
     assert error > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("connected", "arm", "locked"), [(True, "locked", 1), (True, "xarm", 0), (False, "locked", 0)]
+)
+def test_an_arm_that_is_locked_is_not_asked_to_move(connected: bool, arm: str, locked: int) -> None:
+    """Whatever the operator's settings say, which always come without it."""
+    configuration = load()
+    hardware = configuration.hardware.model_copy(update={"connected": connected, "arm": arm})
+    configuration = configuration.model_copy(update={"hardware": hardware})
+    robot = InstrumentRobot(configuration)
+    x = robot.initial_state()["x"][0]
+    loop = ControlLoop(robot, KinematicPlant(configuration, x), configuration)
+    loop.step()
+    assert loop.record["input"]["settings"]["lock_arm"][0] == locked
