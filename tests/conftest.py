@@ -40,6 +40,19 @@ def chromium() -> str:
     return path
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep together on one processor what shares a console or a file's fixtures."""
+    for item in items:
+        fixtures = getattr(item, "fixturenames", ())
+        place = item.nodeid.partition("::")[0]
+        shared = "console" in fixtures
+        if "browser_tests" in place:
+            place = "browser"
+        elif shared and place.startswith("tests/server/"):
+            place = "console"
+        item.add_marker(pytest.mark.xdist_group(place))
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Name the checks that failed before pytest began, right above its closing line."""
     failed = os.environ.get("KEYHOLE_FAILED_CHECKS")

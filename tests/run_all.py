@@ -41,7 +41,9 @@ def main(arguments: Sequence[str]) -> int:
     if chromium:
         environment["KEYHOLE_CHROMIUM"] = chromium
     slowest = ["--durations=15"] if os.environ.get("CI") == "true" else []
-    command = [sys.executable, "-m", "pytest", *slowest, *arguments]
+    # More than two at once would take the processors away from the consoles under test.
+    parallel = [] if arguments else ["-n", "2", "--dist", "loadgroup"]
+    command = [sys.executable, "-m", "pytest", *parallel, *slowest, *arguments]
     status = subprocess.run(command, cwd=ROOT, env=environment, check=False).returncode
     return status or bool(failed)
 
