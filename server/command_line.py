@@ -27,6 +27,7 @@ COMMANDS = {
     "stop": "server.commands.stop",
     "fake-stylus": "server.commands.fake_stylus",
     "faults": "server.commands.faults",
+    "soak": "server.commands.soak",
     "states": "server.commands.states",
 }
 """Subcommands and their modules: ``add_parser(subparsers)`` and ``execute(arguments) -> int``."""

@@ -13,10 +13,14 @@ from server.web.api_robot import ROBOT
 
 
 class Answer(NamedTuple):
-    """What the console answered: status and parsed body; 0 and nothing where nobody answered."""
+    """What the console answered: status and parsed body; 0 and nothing where nobody answered.
+
+    ``body`` holds an object, ``items`` a list, whichever came.
+    """
 
     status: int
     body: dict[str, Any]
+    items: list[dict[str, Any]]
 
     @property
     def ok(self) -> bool:
@@ -71,13 +75,14 @@ class Api:
             answer = connection.getresponse()
             text = answer.read()
         except (OSError, http.client.HTTPException):
-            return Answer(0, {})
+            return Answer(0, {}, [])
         finally:
             connection.close()
         found: Any = None
         with contextlib.suppress(ValueError):
             found = json.loads(text)
-        return Answer(answer.status, found if isinstance(found, dict) else {})
+        body = found if isinstance(found, dict) else {}
+        return Answer(answer.status, body, found if isinstance(found, list) else [])
 
     def take_lease(self, name: str = "fault table") -> bool:
         """Become the operator, or stay it."""

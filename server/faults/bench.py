@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from robot.configuration import Configuration
 from robot.records import Readiness, Safety
 from robot.safety import REASONS, Event
 from server.faults.access import Answer, Api
+from server.faults.clock import SettableClock
 from server.faults.fault import BenchFailed, Deadline
 from server.faults.leading import Circle, StreamLeader
 from server.faults.stylus import StylusProcess
@@ -28,7 +29,6 @@ from server.faults.watching import Records, Watch, commanded_path_mm, reason, sa
 from server.memory.link_records import DEVICES_FILE, SUPERVISION, SUPERVISION_FILE
 from server.memory.mapped import MappedReadError, MappedSlot
 from server.memory.stylus_records import STYLUS_STATUS, STYLUS_STATUS_FILE
-from server.supervision.child_process import module_environment
 
 _ARM_S, _RECOVER_S = 25.0, 60.0
 _REPLY_MS = 4.0
@@ -45,12 +45,13 @@ class Bench:
     Args:
         folder: for its run directory and everything it writes.
         configuration: of the console.
-        hardware: whether it drives servos, simulated ones on a pseudo-terminal.
-        sitecustomize: a folder that goes before all others on the processes' module path.
+        hardware: whether it drives servos, simulated ones on a pseudo-terminal, and is led by a
+            simulated stylus.
 
     Attributes:
         console: the processes. api: the operator's. watch: sees every record.
         page: the operator's; it leads where there is no stylus.
+        clock: the wall clock of its processes.
         servos, stylus: control channels of the simulated bus and stylus; None without them.
     """
 
@@ -60,15 +61,12 @@ class Bench:
         configuration: Configuration,
         *,
         hardware: bool = False,
-        sitecustomize: Path | None = None,
     ) -> None:
         self.folder, self.configuration, self.hardware = folder, configuration, hardware
         self.servos: FakeServos | None = None
         self.stylus: FakeServos | None = None
-        self._environment = {"XDG_DATA_HOME": str(folder / "data")}
-        if sitecustomize is not None:
-            known = module_environment().get("PYTHONPATH", "")
-            self._environment["PYTHONPATH"] = f"{sitecustomize}{os.pathsep}{known}"
+        self.clock = SettableClock(folder / "clock")
+        self._environment = {"XDG_DATA_HOME": str(folder / "data"), **self.clock.environment}
         self._rest = contextlib.ExitStack()
 
     def __enter__(self) -> Self:
@@ -84,7 +82,7 @@ class Bench:
                 self.servos = stack.enter_context(FakeServosProcess(link, "--baud", baud)).servos
                 stylus = stack.enter_context(StylusProcess(folder))
                 self.stylus = stylus.channel
-                arguments = ("--robot", "hardware", "--servos", str(link))
+                arguments = ("--robot", "hardware", "--servos", f"{link}*")
                 arguments += ("--stylus", stylus.address)
             run = folder / "run"
             self.console = stack.enter_context(
@@ -133,6 +131,9 @@ class Bench:
             Deadline.HUNG: HUNG_MS,
             Deadline.LATE: 200.0,
             Deadline.TOLD: 200.0,
+            Deadline.RESTART: 5000.0,
+            Deadline.RECORDER: 2000.0,
+            Deadline.START: 30_000.0,
             Deadline.ANSWER: 1000.0,
         }[deadline]
 
@@ -166,6 +167,11 @@ class Bench:
             return np.asarray(self._devices.read()[0])
         except MappedReadError:
             return np.zeros((), DEVICES)
+
+    def audit(self, event: str) -> list[dict[str, Any]]:
+        """The newest entries of one kind in the audit log."""
+        found = self.api.call("GET", "/audit?last=200").items
+        return [one for one in found if one.get("event") == event]
 
     def bus_text(self, field: str) -> str:
         """A text of what control says of the bus."""

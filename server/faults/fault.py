@@ -38,6 +38,9 @@ class Deadline(Enum):
     HUNG = "the supervisor's patience: 5 s"
     LATE = "the tick that came late"
     TOLD = "the devices' own report, ten times a second"
+    RESTART = "until a process is started anew: 5 s"
+    RECORDER = "the recorder's next write: 2 s"
+    START = "the start of a console: 30 s"
     ANSWER = "the answer to what was asked"
 
 

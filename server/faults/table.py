@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import platform
 import tempfile
 import time
@@ -17,7 +18,9 @@ from server.faults.bus_faults import BUS_FAULTS
 from server.faults.control_faults import CONTROL_FAULTS
 from server.faults.fault import Fault, Finding, row
 from server.faults.input_faults import INPUT_FAULTS
+from server.faults.pose_faults import POSE_FAULTS
 from server.faults.stylus_faults import STYLUS_FAULTS
+from server.faults.surroundings_faults import SURROUNDINGS_FAULTS
 from server.faults.system_faults import LAST_FAULTS, SYSTEM_FAULTS
 
 SCHEMA_VERSION = 1
@@ -27,6 +30,8 @@ FAULTS: tuple[Fault, ...] = (
     *INPUT_FAULTS,
     *CONTROL_FAULTS,
     *SYSTEM_FAULTS,
+    *SURROUNDINGS_FAULTS,
+    *POSE_FAULTS,
     *LAST_FAULTS,
 )
 
@@ -74,7 +79,7 @@ def run(
             with Bench(Path(folder) / kind, base, hardware=kind == "hardware") as bench:
                 for fault in own:
                     progress(len(rows) / len(faults), fault.name)
-                    rows.append(_measured(bench, fault))
+                    rows.append(measured(bench, fault))
     progress(1.0, "")
     return {
         "schema_version": SCHEMA_VERSION,
@@ -86,12 +91,13 @@ def run(
     }
 
 
-def _measured(bench: Bench, fault: Fault) -> dict[str, Any]:
+def measured(bench: Bench, fault: Fault) -> dict[str, Any]:
     """One row; what goes wrong with the injection itself is said in it, and the rest goes on."""
     try:
         finding = fault.measure(bench, fault)
     except (KeyholeError, OSError, IndexError) as error:
-        fault.mend(bench)
+        with contextlib.suppress(KeyholeError, OSError):
+            fault.mend(bench)
         finding = Finding(message=f"not measured: {error}")
     return row(fault, finding, bench.limit_ms(fault.deadline))
 

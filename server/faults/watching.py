@@ -38,10 +38,15 @@ class Watch:
         """Forget what was, and begin anew with the next record."""
         self._next, self._parts = self._ring.sequence, []
 
-    def records(self) -> Records:
-        """All records since the mark, (n,) RECORD."""
+    def take(self) -> Records:
+        """The records since the last call, (n,) RECORD; they are not kept."""
         found, self._next, lost = self._ring.read_since(self._next)
         self.lost |= lost
+        return found
+
+    def records(self) -> Records:
+        """All records since the mark, (n,) RECORD."""
+        found = self.take()
         if len(found):
             self._parts.append(found)
         if len(self._parts) > 1:
