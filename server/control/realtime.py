@@ -23,7 +23,7 @@ _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 _PR_SET_TIMERSLACK = 29
 
 
-def enter(wanted: str) -> str:
+def enter(wanted: str, priority: int = PRIORITY) -> str:
     """Make the calling thread a real-time thread and lock the memory of its process.
 
     Threads that it starts later are ordinary ones. An ordinary thread that holds the interpreter
@@ -31,6 +31,7 @@ def enter(wanted: str) -> str:
 
     Args:
         wanted: "auto" to do what is permitted, "off" to do nothing.
+        priority: under SCHED_FIFO.
 
     Returns:
         "SCHED_FIFO", with what is missing beside it, or "off: " and the reason.
@@ -38,7 +39,7 @@ def enter(wanted: str) -> str:
     _quiet_collector()
     if wanted == "off":
         return "off: switched off in the configuration ([control] realtime)"
-    refusal = _schedule()
+    refusal = _schedule(priority)
     if refusal:
         _shorten_timer_slack()
         return f"off: {refusal}"
@@ -72,14 +73,14 @@ def _quiet_collector() -> None:
     gc.disable()
 
 
-def _schedule() -> str:
+def _schedule(priority: int) -> str:
     """Ask for SCHED_FIFO; returns why not, or nothing."""
     if not hasattr(os, "sched_setscheduler"):
         return "this system has no SCHED_FIFO"
     # Threads started later from this one must not become real-time threads too.
     policy = os.SCHED_FIFO | getattr(os, "SCHED_RESET_ON_FORK", 0)
     try:
-        os.sched_setscheduler(0, policy, os.sched_param(PRIORITY))
+        os.sched_setscheduler(0, policy, os.sched_param(priority))
     except PermissionError:
         limit = resource.getrlimit(resource.RLIMIT_RTPRIO)[1]
         return (

@@ -21,7 +21,7 @@ from robot.configuration import Stylus
 from robot.errors import KeyholeError
 from robot.records import LeaderKind
 from server.control.lifeline import Lifeline
-from server.control.realtime import prefer
+from server.control.realtime import PRIORITY, enter, prefer
 from server.leaders import rosbridge
 from server.leaders.connection import Connection, ConnectionFailed, connect, wait
 from server.leaders.control_view import ControlView
@@ -90,6 +90,8 @@ class StylusLeader:
             self._say(now_ns)
 
     def _connect(self) -> None:
+        # The collector is off where this process is a real-time one; here nobody waits for it.
+        gc.collect()
         configuration = self._configuration
         try:
             self._connection = connection = connect(configuration.url, _CONNECT_S)
@@ -208,9 +210,11 @@ def lead(directory: RunDirectory, stopped: Callable[[], bool]) -> None:
     Raises:
         KeyholeError: the run directory holds no console.
     """
-    leader = StylusLeader(directory.path, directory.configuration().stylus)
-    gc.collect()
-    gc.freeze()
+    configuration = directory.configuration()
+    leader = StylusLeader(directory.path, configuration.stylus)
+    # On a busy machine samples otherwise come late, which control must take for silence.
+    if not enter(configuration.control.realtime, PRIORITY - 10).startswith("SCHED_FIFO"):
+        prefer()
     try:
         while not stopped():
             leader.step()
@@ -233,7 +237,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The supervisor gets them too, and ends everything in order.
         signal.signal(ignored, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda number, _: ending.append(number))
-    prefer()
     lifeline = Lifeline(arguments.lifeline_fd)
     try:
         lead(
