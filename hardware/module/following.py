@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from hardware.module.preparation import HELD_TICKS
+from hardware.module.preparation import resting_goal
 from hardware.module.transmission import Transmission
 from robot.records import SERVOS
 
@@ -41,12 +41,11 @@ class Follower:
         self._exact = [0.0] * SERVOS
         self._wanted = [0.0] * SERVOS
 
-    def hold(self, position: Sequence[int]) -> None:
-        """Stop here: at the goals that are reached but for the load, else at ``position``."""
+    def hold(self, position: Sequence[int], load: Sequence[int]) -> None:
+        """Stop at ``position`` (ticks), with the ``load`` (of the register) that is carried."""
         self.holding, self._rested, self.refusing = True, False, False
         for index, tick in enumerate(position):
-            if abs(self.goals[index] - tick) > HELD_TICKS:
-                self.goals[index] = tick
+            self.goals[index] = resting_goal(self.goals[index], tick, load[index])
             self._exact[index] = self.goals[index]
 
     def take(self, goals: Sequence[float]) -> None:

@@ -22,8 +22,10 @@ _SURE = 3
 """Readings in a row that make a load certain."""
 _PAY_OUT_DEG = 60.0
 """How far tendons are let out at most until they are loose."""
-_ANSWERS = 0.4
-"""The opposite tendon takes at least this share of what is pulled at one; about half is usual."""
+_TEST_LOAD = 0.05
+"""How much more one servo is loaded to see who answers: friction in the gears hides less."""
+_ANSWERS = 0.3
+"""Share of it that the tendon that answers shows at least."""
 _SETTLE_S = 0.15
 _PAIRS = ((0, 2), (1, 3))
 _SHARE = 0.01 * TABLE["present_load"].unit_scale
@@ -139,11 +141,12 @@ class Homing:
         raise NeverTaut(names, self._range / self._ticks_per_deg)
 
     def _pretension_pair(self, first: int, second: int) -> _Steps:
-        """Pull ``first`` to the pretension, see who is loaded by it, then share it out evenly."""
+        """Pull ``first`` until it is loaded, see who is loaded by it, then share it out evenly."""
         before = list(self._pull)
+        wanted = max(self._pretension, before[first] + _TEST_LOAD)
         travel, sure = 0.0, 0
         while sure < _SURE:
-            if self._pull[first] >= self._pretension:
+            if self._pull[first] >= wanted:
                 sure += 1
             else:
                 sure = 0

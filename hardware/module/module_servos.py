@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Sequence
 
-from hardware.module.errors import ModuleError
+from hardware.module.errors import ModuleError, NoRoom
 from hardware.module.following import Follower
 from hardware.module.homing import Homing
 from hardware.module.preparation import (
@@ -23,6 +23,7 @@ from hardware.module.preparation import (
     release_all,
     torque_on,
 )
+from hardware.module.remembering import forget_zero, remember_zero, remembered_zero
 from hardware.module.transmission import Transmission
 from hardware.module.watching import ServoWatch
 from hardware.servos.bus import ServoBus
@@ -107,19 +108,35 @@ class ModuleServos:
         self.cycle = CyclicExchange(bus, self.settings.ids, self.prepared.fast, self._patience_s)
         for index, status in enumerate(self.prepared.status):
             self._note(index, status)
+        if not all(self.torque):
+            forget_zero(bus, self.settings)
         if not (all(self.torque) or self._released):
             if self.homed:
                 self.message = "the servos have lost their torque; home again"
             self.homed = False
         elif known and self.homed:
             self.message = "connected again; enable to go on"
+        elif not known and all(self.torque):
+            self._take_up(bus)
         self.follower.take(self.prepared.goals)
-        self.follower.hold(self.prepared.position)
+        self.follower.hold(self.prepared.goals, (0,) * SERVOS)
         self.cycle.position[:] = self.prepared.position
         self.watch.forget(self.cycle, self.follower.goals)
         arm_watchdogs(bus, self.settings)
         self._last_ns = time.monotonic_ns()
         self.stamps_ns = [self._last_ns] * SERVOS
+
+    def _take_up(self, bus: ServoBus) -> None:
+        """Servos that have held ever since another host homed them need no homing."""
+        zero = remembered_zero(bus, self.settings)
+        if zero is None:
+            return
+        try:
+            self.transmission.set_zero(zero)
+        except NoRoom:
+            return
+        self.homed = True
+        self.message = "the servos held on; enable to go on"
 
     def disconnect(self) -> None:
         """The port is gone; the servos stop by their watchdogs."""
@@ -168,6 +185,8 @@ class ModuleServos:
         else:
             self._look_deeper()
         self._decide(now_ns)
+        if not (follower.holding or self.event):
+            self.message = ""
         if follower.refusing and not self.event:
             self.message = "the motion does not begin where the servos are; disable, then enable"
         if self.homing is not None and answered == ALL:
@@ -180,17 +199,16 @@ class ModuleServos:
             self._silent = self._silent or self.watch.event == Event.SERVO_SILENT
             self._tell(self.watch.event, self.watch.message, now_ns)
         elif any(self.errors):
-            index = next(index for index in range(SERVOS) if self.errors[index])
-            message = fault_message(self.settings.ids[index], self.errors[index])
-            self._tell(Event.SERVO_FAULT, message, now_ns)
+            self._tell(Event.SERVO_FAULT, "", now_ns)
         elif self.event and now_ns > self._until_ns:
             self.event = 0
 
     def _tell(self, event: int, message: str, now_ns: int = 0) -> None:
         if not self.event:
             self.hold()
-        if self.errors != [0] * SERVOS and event == Event.SERVO_FAULT:
-            index = next(index for index in range(SERVOS) if self.errors[index])
+        faulty = [index for index in range(SERVOS) if self.errors[index]]
+        if faulty and event == Event.SERVO_FAULT:
+            index = faulty[0]
             message = fault_message(self.settings.ids[index], self.errors[index])
         self.event, self.message = int(event), message
         self._until_ns = (now_ns or time.monotonic_ns()) + _LASTS_NS
@@ -224,6 +242,7 @@ class ModuleServos:
             self._begin_anew(Event.BUS_LOST, "the bus was silent for too long")
         elif had and not status.torque and not status.error:
             self.homed = False
+            forget_zero(self._bus, self.settings)
             servo = self.settings.ids[index]
             self._begin_anew(Event.SERVO_FAULT, f"servo {servo} lost its torque; home again")
 
@@ -245,13 +264,14 @@ class ModuleServos:
     def hold(self) -> None:
         """Stay where they are and follow nothing."""
         if self.cycle is not None:
-            self.follower.hold(self.cycle.position)
+            self.follower.hold(self.cycle.position, self.cycle.load)
         self.homing = None
 
     def release(self) -> None:
         """Take torque off all, whatever one of them does."""
         self.hold()
         self._released = True
+        forget_zero(self._bus, self.settings)
         unsure = release_all(self._bus, self.settings.ids)
         self.torque = [False] * SERVOS
         self.message = "torque is off; take hold to go on"
@@ -271,6 +291,8 @@ class ModuleServos:
         if self.homed and moved > self._slack:
             self.homed = False
             self.message = "the tendons went slack without torque; home"
+        if self.homed:
+            remember_zero(self._bus, self.settings, self.transmission.zero)
 
     def _begin(self, bus: ServoBus) -> None:
         message = self.message
@@ -293,6 +315,7 @@ class ModuleServos:
             self.take_hold()
         self._released = False
         self.homed = False
+        forget_zero(self._bus, self.settings)
         self.message = "homing"
         self.homing = Homing(self.transmission, self.settings, self._period_s)
 
@@ -305,6 +328,7 @@ class ModuleServos:
                 self.transmission.set_zero(self.follower.goals)
                 self.homed, self.message = True, ""
                 self.homing = None
+                remember_zero(self._bus, self.settings, self.transmission.zero)
         except ModuleError as error:
             self.hold()
             self.message = str(error)

@@ -44,9 +44,10 @@ _EEPROM = {
 _SILENT_LEVEL = TABLE["status_return_level"]
 _VELOCITY_UNIT_DEG_S = TABLE["profile_velocity"].unit_scale * 6.0
 _STATUS = (TABLE["torque_enable"].address, TABLE["bus_watchdog"].end)
-HELD_TICKS = 17
-"""A goal no further than this (1.5 degrees) from where its servo stands is one that is held: what
-lies between carries the tendon's load."""
+_NEAR_TICKS = 17
+"""A goal no further than this (1.5 degrees) from the one that carries the load is that one."""
+_TICKS_PER_LOAD = 0.001 * 128.0 * 885.0 / TABLE["position_p_gain"].initial
+"""The servo's loop drives it in proportion to what it is off: PWM = gain / 128 per tick."""
 
 _RELEASE_TIMES = 3
 _BOOT_S = 3.0
@@ -132,7 +133,10 @@ def prepare(bus: ServoBus, settings: Servos) -> Prepared:
         bus.write(servo, "profile_acceleration", 0)
         bus.write(servo, "profile_velocity", velocity)
     position = tuple(bus.read(servo, "present_position") for servo in ids)
-    goals = tuple(_resting_goal(bus, *each) for each in zip(ids, position, status, strict=True))
+    goals = tuple(
+        _read_resting_goal(bus, servo, tick, state.torque)
+        for servo, tick, state in zip(ids, position, status, strict=True)
+    )
     for servo, goal, state in zip(ids, goals, status, strict=True):
         if not state.error:
             bus.write(servo, "goal_position", goal)
@@ -141,12 +145,24 @@ def prepare(bus: ServoBus, settings: Servos) -> Prepared:
     return Prepared(found, status, position, goals, fast)
 
 
-def _resting_goal(bus: ServoBus, servo: int, position: int, status: ServoStatus) -> int:
-    """A goal that leaves the servo where it is, with the load that it carries there."""
-    goal = bus.read(servo, "goal_position") if status.torque else position
-    if abs(goal - position) > HELD_TICKS:
-        goal = position
-    return min(max(goal, 0), TICKS_PER_TURN - 1)
+def resting_goal(goal: int, position: int, load: int) -> int:
+    """The goal that leaves a servo where it is, with the load that it carries there.
+
+    Args:
+        goal: ticks, the present one; kept if it is near.
+        position: ticks.
+        load: present load, as the register has it.
+    """
+    carrying = position + round(load * _TICKS_PER_LOAD)
+    kept = goal if abs(goal - carrying) <= _NEAR_TICKS else carrying
+    return min(max(kept, 0), TICKS_PER_TURN - 1)
+
+
+def _read_resting_goal(bus: ServoBus, servo: int, position: int, torque: bool) -> int:
+    if not torque:
+        return resting_goal(position, position, 0)
+    load = bus.read(servo, "present_load")
+    return resting_goal(bus.read(servo, "goal_position"), position, load)
 
 
 def _write_eeprom(bus: ServoBus, servo: int, torque: bool) -> None:

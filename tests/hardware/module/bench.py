@@ -107,12 +107,22 @@ class Bench:
         self.until(lambda reading: reading.readiness != Readiness.NOT_CONNECTED)
         self.until(lambda reading: reading.event == 0)
         if self.read().readiness != Readiness.READY:
-            self.module.home()
-            self.until(lambda reading: reading.readiness == Readiness.BUSY)
-            self.until(lambda reading: reading.readiness == Readiness.READY)
+            assert self.home() == ""
         self.read()
         self.command[:] = self.angles
         self.rest()
+
+    def home(self) -> str:
+        """Home, again if a busy machine let answers get lost; what the module says of it."""
+        for _ in range(4):
+            self.module.home()
+            self.until(lambda reading: reading.readiness == Readiness.BUSY)
+            self.until(lambda reading: reading.readiness != Readiness.BUSY)
+            self.until(lambda reading: reading.event == 0)
+            message = self.message
+            if "silent" not in message:
+                break
+        return message
 
     def goals(self) -> list[int]:
         """What the simulated servos are told."""

@@ -20,7 +20,7 @@ DT_S = 0.004
 def _follower() -> Follower:
     follower = Follower(Transmission(CONFIGURATION), SPEED)
     follower.take([2048] * 4)
-    follower.hold([2048] * 4)
+    follower.hold([2048] * 4, [0] * 4)
     return follower
 
 
@@ -63,11 +63,11 @@ def test_an_old_command_is_not_followed_any_further() -> None:
     assert follower.goals == goals
 
 
-def test_a_hold_keeps_a_goal_that_carries_load_and_drops_one_that_is_far() -> None:
+def test_a_hold_keeps_the_load_and_drops_a_goal_that_is_far() -> None:
     follower = _follower()
-    follower.take([2048, 2048, 2048, 2048])
-    follower.hold([2060, 2148, 2036, 1948])
-    assert follower.goals == [2048, 2148, 2048, 1948]
+    # 10 % of load are 17.7 ticks at the servo's usual gain.
+    follower.hold([2060, 2148, 2036, 1948], [0, 0, 100, -100])
+    assert follower.goals == [2048, 2148, 2048, 1930]
 
 
 def test_angles_are_cut_to_the_range() -> None:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hardware.devices import DeviceState
+from hardware.fake_servos.client import FakeServosProcess
+from hardware.module.module import InstrumentModule
 from robot.records import Readiness
-from tests.hardware.module.bench import IDS, Bench, bench
+from tests.hardware.module.bench import IDS, Bench, bench, settings
 
 
 @pytest.fixture(scope="module")
@@ -100,10 +103,35 @@ def test_people_are_told_about_the_bus(homed: Bench) -> None:
 def test_a_wrong_sign_is_found_at_homing() -> None:
     with bench("--faults", "reversed:servo=102") as made:
         made.until(lambda reading: reading.readiness == Readiness.NOT_HOMED)
-        made.module.home()
-        made.until(lambda reading: reading.readiness == Readiness.BUSY)
+        assert made.home().startswith("servo 102: turns the wrong way")
+        assert made.read().readiness == Readiness.NOT_HOMED
+
+
+def test_tendons_in_the_wrong_order_are_found_at_homing() -> None:
+    with bench("--ids", "102,101,103,104") as made:
         made.until(lambda reading: reading.readiness == Readiness.NOT_HOMED)
-        assert made.message.startswith("servo 102: turns the wrong way")
+        assert made.home().startswith("servo 101: pulling it loads 104 rather than 103")
+
+
+def test_a_slack_tendon_is_found_at_homing() -> None:
+    with bench("--slack-mm", "0.8,1.2,30,0.6", homing_range_deg=60.0) as made:
+        made.until(lambda reading: reading.readiness == Readiness.NOT_HOMED)
+        assert "not taut after 60 deg" in made.home()
+
+
+def test_a_host_that_is_started_again_finds_the_zero_with_the_servos(tmp_path: Path) -> None:
+    link = tmp_path / "ttyFAKE0"
+    with FakeServosProcess(link) as process:
+        for homed_before in (False, True):
+            module = InstrumentModule(settings(link))
+            try:
+                made = Bench(module, process.servos)
+                made.until(lambda reading: reading.readiness != Readiness.NOT_CONNECTED)
+                assert (made.read().readiness == Readiness.READY) == homed_before
+                made.ready()
+                assert np.all(np.abs(made.angles) < math.radians(6.0))
+            finally:
+                module.close()
 
 
 def test_servos_of_the_factory_are_set_up_without_touching_their_torque() -> None:
