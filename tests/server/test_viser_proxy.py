@@ -244,6 +244,8 @@ def test_a_watchers_gizmo_moves_nothing(driver: ApiClient, watcher: ApiClient) -
     scene.socket.close()
     assert after["true"] == before["true"]
     assert (after["engaged"], after["leader"]) == (False, "none")
+    log = driver.http.get("/audit", params={"last": 200}).json()
+    assert any("tried to drag the gizmo" in entry["text"] for entry in log)
 
 
 def test_closing_the_scene_mid_drag_lets_go(scene: Scene, driver: ApiClient) -> None:

@@ -260,3 +260,32 @@ def test_before_the_first_tick_the_scene_stands_as_configured(
     before = messages(server)
     view.step(10.0)
     assert messages(server) == before
+
+
+def test_a_picture_that_fails_is_told_once_and_the_next_is_drawn(
+    view: SceneView, link: Recorder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    view.on_failure = told.append
+    drawn = view._draw
+    tries: list[int] = []
+
+    def failing(now: float, record: object) -> None:
+        tries.append(1)
+        if len(tries) % 2:
+            raise ZeroDivisionError("a plot without a range")
+        raise ValueError("a pose that is none")
+
+    monkeypatch.setattr(view, "_draw", failing)
+    monkeypatch.setattr("server.scene.view.UNWATCHED_PERIOD", 0.0)
+    link.move(link.start)
+    view.start()
+    until(lambda: len(tries) > 6)
+    monkeypatch.setattr(view, "_draw", drawn)
+    before = view._drawn
+    until(lambda: view._drawn > before + 0.2)
+    view.stop()
+    assert told == [
+        "ZeroDivisionError: a plot without a range",
+        "ValueError: a pose that is none",
+    ]
