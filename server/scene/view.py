@@ -159,6 +159,7 @@ class SceneView:
 
         Raises:
             KeyholeError: the link has no whole record to give.
+            FloatingPointError: what should be drawn is no number.
         """
         clients = set(self._server.get_clients())
         self.gizmo.release_unless(clients)
@@ -168,6 +169,7 @@ class SceneView:
             return
         watched = bool(clients)
         truth, report = record["truth"], record["outcome"]["report"]
+        _check_drawable(truth)
         self._trails.update(now, report["desired_position"], truth["position"], draw=watched)
         if not watched and now - self._drawn < UNWATCHED_PERIOD:
             return
@@ -209,3 +211,11 @@ class SceneView:
         position, wxyz = np.empty(3), np.empty(4)
         expected_pose(np.array([record["outcome"]]), position, wxyz)
         self.gizmo.update(now, position, wxyz, ready=bool(enabled))
+
+
+def _check_drawable(truth: Any) -> None:
+    """A browser that is sent what is no number shows nothing, and says nothing."""
+    parts = ("q", "uv", "position", "wxyz", "shaft_base", "shaft_end")
+    for part in parts:
+        if not np.isfinite(truth[part]).all():
+            raise FloatingPointError(f"the robot's {part} is no number")

@@ -289,3 +289,12 @@ def test_a_picture_that_fails_is_told_once_and_the_next_is_drawn(
         "ZeroDivisionError: a plot without a range",
         "ValueError: a pose that is none",
     ]
+
+
+@pytest.mark.parametrize("part", ["q", "uv", "position", "wxyz", "shaft_base", "shaft_end"])
+def test_what_is_no_number_is_not_drawn(view: SceneView, link: Recorder, part: str) -> None:
+    link.move(link.start)
+    view.step(10.0)
+    link.record["truth"][part] = np.nan
+    with pytest.raises(FloatingPointError, match=part):
+        view.step(20.0)
