@@ -102,13 +102,20 @@ function guarded(name, act) {
   try {
     act();
   } catch (error) {
-    if (failed.has(name)) return;
-    failed.add(name);
-    const words = `${name}: ${error}`.slice(0, 300);
-    tell(`A part of this page failed (${words}). The rest and the robot go on; reload the page.`, "error");
-    stream.send({ type: "page-error", words });
+    partFailed(name, error);
   }
 }
+
+function partFailed(name, error) {
+  if (failed.has(name)) return;
+  failed.add(name);
+  const words = `${name}: ${error}`.slice(0, 300);
+  tell(`A part of this page failed (${words}). The rest and the robot go on; reload the page.`, "error");
+  stream.send({ type: "page-error", words });
+}
+
+// What draws at its own pace, such as the plots, fails outside of every part.
+window.addEventListener("error", (event) => partFailed("drawing", event.message));
 
 function showLeader({ leader, engaged, plant, preset, seed }) {
   setText(byId("leader"), LEADERS[leader] ?? leader);

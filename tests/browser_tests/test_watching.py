@@ -125,3 +125,20 @@ def test_a_fault_can_be_tried_and_stands_among_the_events(
     page.keyboard.press("j")
     operator.enable()
     assert console.state()["safety"]["state"] == "ENABLED"
+
+
+def test_a_part_of_the_page_that_fails_takes_no_other_with_it(
+    operator: ConsolePage, console: ConsoleProcess
+) -> None:
+    page = operator.page
+    # What one part writes into is gone.
+    page.evaluate("() => document.getElementById('contact-text').remove()")
+    expect(page.get_by_role("alert").filter(has_text="A part of this page failed")).to_be_visible()
+    tick = operator.shown()["tick"]
+    eventually(lambda: operator.shown()["tick"] > tick + 50, "the page goes on", SLOW_S)
+    assert console.state()["safety"]["state"] == "ENABLED"
+    page.locator("#emergency-stop").click()
+    operator.until("FAULT")
+    page.reload()
+    eventually(lambda: operator.page.evaluate("() => window.keyhole?.state ?? null"), "it is back")
+    operator.wait_for_scene()
