@@ -19,7 +19,7 @@ from server.command_line import COMMANDS, _parser
 from server.configuration_file import load
 from server.memory.link import WebLink
 from server.memory.link_records import create_mapped_files
-from server.web import refusals, stream
+from server.web import api_stylus, refusals, stream
 from server.web.access import Access
 from server.web.api_robot import ROBOT
 from server.web.app import create_app
@@ -186,7 +186,9 @@ def test_the_interface_is_described_as_it_is(tmp_path: Path) -> None:
         for method in operations
     }
     known |= {
-        ("WS", route.path) for route in stream.router.routes if isinstance(route, WebSocketRoute)
+        ("WS", route.path)
+        for route in (*stream.router.routes, *api_stylus.router.routes)
+        if isinstance(route, WebSocketRoute)
     }
     listed = set()
     for method, path, _, _ in _rows("docs/labs.md", "method", "path", "who", "what"):
