@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import os
 import re
@@ -16,7 +17,7 @@ import pytest
 from benchmarks.console import ROBOT
 from robot.records import Safety
 from server.audit.reader import newest
-from server.commands.stop import NothingToStop
+from server.commands.stop import NothingToStop, execute
 from server.memory.link import WebLink
 from server.memory.link_records import create_mapped_files
 from server.memory.replay_link import create_replay_files
@@ -147,6 +148,22 @@ def test_a_recorder_that_is_killed_misses_no_change(console: ConsoleProcess) -> 
     eventually(lambda: later() == expected, "the changes stand in the log, once")
     ended = newest(console.audit, 10, event="process_ended")
     assert (ended[-1]["process"], ended[-1]["cause"]) == ("recorder", "signal SIGKILL")
+
+
+def test_a_stop_that_is_not_seen_is_not_called_one(
+    console: ConsoleProcess, capsys: pytest.CaptureFixture[str]
+) -> None:
+    console.wait_until_running()
+    control = console.children()[0]
+    os.kill(control, signal.SIGSTOP)
+    try:
+        status = execute(argparse.Namespace(run_directory=console.directory))
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(control, signal.SIGCONT)
+    assert status == 1
+    assert "does not confirm it; use the stop on the machine" in capsys.readouterr().out
+    console.wait_until_running()
 
 
 def test_where_nothing_runs_the_command_says_what_to_do(
