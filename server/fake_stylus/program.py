@@ -21,6 +21,7 @@ from server.fake_stylus.device import FakeStylus, Sample
 from server.fake_stylus.faults import Fault, Faults, make, parse
 from server.fake_stylus.wording import OwnWording, RosWording, as_null, number
 from server.leaders.connection import wait
+from server.leaders.rosbridge import UNDECODABLE
 
 RATE_HZ = 500.0
 BUTTONS_EVERY = 3
@@ -276,7 +277,7 @@ def forces_in(text: bytes) -> Any:
     """A message from the other end, decoded; None where it is no JSON object."""
     try:
         found = msgspec.json.decode(text)
-    except msgspec.DecodeError:
+    except UNDECODABLE:
         return None
     return found if isinstance(found, dict) else None
 

@@ -23,6 +23,9 @@ SERVO_TYPE = "std_msgs/Float32MultiArray"
 LARGEST_MESSAGE = 4096
 """Bytes; a pose takes some 250."""
 
+UNDECODABLE = (msgspec.MsgspecError, UnicodeDecodeError, RecursionError)
+"""What the decoder raises; text that is no UTF-8 is not among its own errors."""
+
 
 class Unreadable(KeyholeError):
     """A message of a bridge is not what it should be.
@@ -151,12 +154,12 @@ class Reader:
             raise Unreadable("oversized", f"a message of {len(data)} bytes")
         try:
             return self._read(data)
-        except msgspec.MsgspecError as error:
+        except UNDECODABLE as error:
             if b"NaN" not in data and b"Infinity" not in data:
                 raise Unreadable("malformed", f"a message cannot be read: {error}") from None
         try:
             return self._read(_finite_json(data))
-        except msgspec.MsgspecError as error:
+        except UNDECODABLE as error:
             raise Unreadable("malformed", f"a message cannot be read: {error}") from None
 
     def _read(self, data: bytes) -> Pose | Buttons | Status:
@@ -206,7 +209,7 @@ def publish_force(topic: str, force: tuple[float, float, float], stamp_ns: int) 
     x, y, z = force
     sec, nanosec = divmod(stamp_ns, 1_000_000_000)
     return (
-        f'{{"op":"publish","topic":"{topic}","msg":{{"header":{{"stamp":{{"sec":{sec},'
+        f'{{"op":"publish","topic":{json.dumps(topic)},"msg":{{"header":{{"stamp":{{"sec":{sec},'
         f'"nanosec":{nanosec}}},"frame_id":""}},"wrench":{{"force":{{"x":{x:.5f},"y":{y:.5f},'
         f'"z":{z:.5f}}},"torque":{{"x":0.0,"y":0.0,"z":0.0}}}}}}}}'
     ).encode()

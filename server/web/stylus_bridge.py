@@ -13,6 +13,7 @@ from robot.configuration import Configuration
 from robot.records import LeaderKind
 from server.leaders.control_view import ControlView
 from server.leaders.force import NO_FORCE, Force, SpringForce
+from server.leaders.rosbridge import UNDECODABLE
 from server.leaders.status import SAY_NS, StylusReport, StylusStatusFile
 from server.leaders.stylus_input import StylusInput
 from server.memory.leader_slot import LeaderSlot
@@ -52,7 +53,7 @@ def read_sample(data: bytes) -> StylusMessage:
         raise UnreadableRequest(f"the message is longer than {LARGEST_MESSAGE} bytes")
     try:
         return _messages.decode(data)
-    except msgspec.MsgspecError as error:
+    except UNDECODABLE as error:
         if b"NaN" in data or b"Infinity" in data:
             return _without_numbers(data)
         raise UnreadableRequest(f"a sample cannot be read: {error}") from None
@@ -64,7 +65,7 @@ def _without_numbers(data: bytes) -> StylusMessage:
         data = data.replace(word, b"null")
     try:
         return _messages.decode(data)
-    except msgspec.MsgspecError as error:
+    except UNDECODABLE as error:
         raise UnreadableRequest(f"a sample cannot be read: {error}") from None
 
 
@@ -166,6 +167,8 @@ class StylusBridge:
 
     def force(self, bridge: object) -> tuple[Force, bool]:
         """What a bridge's stylus shall feel now, N, in its own frame; and whether it leads."""
+        if self._elsewhere:
+            return NO_FORCE, False
         now_ns = self._clock_ns()
         silent = self._bridge is not bridge or now_ns - self._heard_ns > self._timeout_ns
         if silent:

@@ -92,5 +92,7 @@ def test_what_is_sent_is_what_the_protocol_says() -> None:
     assert told["msg"]["wrench"]["force"] == {"x": 0.1, "y": -0.25, "z": 0.0}
     assert told["msg"]["wrench"]["torque"] == {"x": 0.0, "y": 0.0, "z": 0.0}
     assert told["msg"]["header"]["stamp"] == {"sec": 3, "nanosec": 4}
+    odd = json.loads(rosbridge.publish_force('/"odd"', (0.0, 0.0, 0.0), 0))
+    assert odd["topic"] == '/"odd"'
     servos = json.loads(rosbridge.publish_servos("/servo_command", [10.0, -10.0, 0.123456, 0.0]))
     assert servos["msg"]["data"] == [10.0, -10.0, 0.1235, 0.0]

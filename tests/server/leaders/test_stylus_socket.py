@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,13 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
 
+from robot.configuration import Configuration
 from server.fake_stylus.outlets import STYLUS_PATH, LeaseNotTaken, take_lease
-from server.web.refusals import UnreadableRequest
-from server.web.stylus_bridge import LARGEST_MESSAGE, read_sample
+from server.leaders.force import NO_FORCE
+from server.memory.link import WebLink
+from server.web.lease import Lease
+from server.web.refusals import NotReady, UnreadableRequest
+from server.web.stylus_bridge import LARGEST_MESSAGE, StylusBridge, read_sample
 from tests.server.api_client import JSON, ApiClient, newest
 from tests.server.console_process import eventually
 
@@ -179,3 +184,17 @@ def test_a_lease_for_a_program(driver: ApiClient) -> None:
 def test_a_scale_that_makes_no_sense_is_refused(driver: ApiClient, scale: float) -> None:
     driver.refused("PUT", "/teleoperation", {"motion_scale": scale})
     assert driver.state()["teleoperation"]["motion_scale"] == 1.0
+
+
+def test_where_a_rosbridge_leads_there_is_no_second_stylus(
+    directory: Path, configuration: Configuration
+) -> None:
+    stylus = configuration.stylus.model_copy(update={"source": "rosbridge"})
+    link = WebLink(directory)
+    elsewhere = StylusBridge(link, Lease(5.0), configuration.model_copy(update={"stylus": stylus}))
+    with pytest.raises(NotReady, match="rosbridge"):
+        elsewhere.check()
+    assert elsewhere.force(object()) == (NO_FORCE, False)
+    elsewhere.left(object())
+    assert elsewhere.status() is None, "its process has not spoken"
+    link.close()
