@@ -88,7 +88,7 @@ class ControlChannel:
             if not isinstance(request, dict):
                 raise BadRequest("a request is an object")
             answer = self._answer(request)
-        except msgspec.DecodeError as error:
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
             return {"ok": False, "stamp_ns": stamp_ns, "code": "bad_json", "message": str(error)}
         except KeyholeError as error:
             return {"ok": False, "stamp_ns": stamp_ns, "code": error.code, "message": str(error)}
