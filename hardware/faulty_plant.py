@@ -75,7 +75,7 @@ FAULTS: dict[str, PlantFault] = {
         "A joint's encoder jumps by 20 degrees", offset_joint=1, offset_rad=math.radians(20.0)
     ),
     "arm-pushed": PlantFault(
-        "Something pushes the arm off the trocar", offset_joint=0, offset_rad=0.06
+        "Something pushes the arm off the trocar", offset_joint=0, offset_rad=0.035
     ),
     "outside-limits": PlantFault(
         "A joint stands outside its limits",

@@ -31,7 +31,8 @@ from server.memory.mapped import MappedReadError, MappedSlot
 from server.memory.stylus_records import STYLUS_STATUS, STYLUS_STATUS_FILE
 
 _ARM_S, _RECOVER_S = 25.0, 60.0
-_REPLY_MS = 4.0
+_REPLY_MS = 10.0
+"""How long a cycle waits for its answers: wire, adapter and patience at 1 M baud."""
 _PATIENCE = "wait"
 _GO_HOME_S, _AT_HOME_MM, _TURN_RAD = 3.0, 0.5, 1.4
 _UNDER_WAY_MM = 1.0
@@ -115,8 +116,8 @@ class Bench:
 
     @property
     def bus_ms(self) -> float:
-        """Two missed cycles of the servo bus, and the deadline of a reply, ms."""
-        return 2e3 / self.configuration.servos.rate_hz + _REPLY_MS
+        """Two missed cycles of the servo bus, ms: each ends when its answers do not come."""
+        return 1e3 / self.configuration.servos.rate_hz + 2.0 * _REPLY_MS
 
     def limit_ms(self, deadline: Deadline) -> float:
         """A deadline as a number, ms; two ticks for the loop and the clock that is read."""

@@ -25,14 +25,13 @@ from server.faults.stopping import (
     stamp,
     stopped,
 )
-from server.faults.watching import Records, commanded_path_mm, reach_mm, safety, stands_still
+from server.faults.watching import Records, commanded_path_mm, safety, stands_still
 
 _LOST = (Event.BUS_LOST, Event.SERVO_SILENT, Event.MEASUREMENT_LOST)
 _SERVO = 102
 _BURST = 40
 _SETTLE_S = 0.3
 _WATCHDOG_LOOK_S = 0.5
-_SMALLEST_TICKS = 2
 
 
 def _servos(bench: Bench) -> FakeServos:
@@ -218,14 +217,14 @@ def _host_gone(number: signal.Signals) -> Callable[[Bench, Fault], Finding]:
         bench.watch.mark()
         began_ns = bench.signal("control", number)
         time.sleep(_WATCHDOG_LOOK_S)
-        moved = _servos(bench).positions(since_ns=began_ns)
-        last_ns = _last_motion_ns(moved, began_ns)
-        finding = Finding(detected=True, state="control down")
-        finding.detected_within_ms = (last_ns - began_ns) * 1e-6
+        tripped_ns = max(int(one["tripped_ns"]) for one in _servos(bench).state()["servos"])
+        finding = Finding(detected=tripped_ns > began_ns, state="control down")
+        finding.detected_within_ms = (tripped_ns - began_ns) * 1e-6
         records = bench.watch.records()
         late = records[records["header"]["stamp_ns"] > began_ns]
-        finding.commanded_travel_mm, finding.coast_mm = commanded_path_mm(late), reach_mm(late)
-        finding.remark = "time until the last motion of a servo"
+        finding.commanded_travel_mm = commanded_path_mm(late)
+        finding.coast_mm = _bent_mm(bench, tripped_ns)
+        finding.remark = "until all servos had stopped by themselves; the coast is their segment's"
         with contextlib.suppress(OSError):
             os.kill(old, signal.SIGKILL)
         bench.wait(lambda: bench.pid("control") not in (0, old), "control is back", 40.0)
@@ -241,16 +240,17 @@ def _host_gone(number: signal.Signals) -> Callable[[Bench, Fault], Finding]:
     return measure
 
 
-def _last_motion_ns(moved: list[list[object]], began_ns: int) -> int:
-    """When a servo last moved by more than the last tick of settling."""
-    last_ns = began_ns
+def _bent_mm(bench: Bench, since_ns: int) -> float:
+    """How far the simulated segment's end still came after a time, mm.
+
+    Of the servos' own angles nothing can be said: their tendons relax a little as they stop.
+    """
+    moved = _servos(bench).positions(since_ns=since_ns)
     if not moved:
-        return last_ns
-    final = np.array(moved[-1][1], dtype=float)
-    for stamp_ns, ticks, *_ in moved:
-        if np.abs(np.array(ticks, dtype=float) - final).max() > _SMALLEST_TICKS:
-            last_ns = int(str(stamp_ns))
-    return last_ns
+        return 0.0
+    bends = np.array([one[2] for one in moved], dtype=float)
+    length_mm = bench.configuration.instrument.segment_length_m * 1e3
+    return float(np.linalg.norm(bends - bends[0], axis=1).max() * length_mm)
 
 
 BUS_FAULTS = (

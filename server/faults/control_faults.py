@@ -8,13 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot.records import Refusal, Safety
-from robot.safety import Event
+from robot.safety import REASONS, Event
 from server.faults.bench import Bench
 from server.faults.fault import Deadline, Fault, Finding, Group
 from server.faults.stopping import LOOK_S, NOTICE_S, afterwards, describe, recovered, stamp, stopped
-from server.faults.watching import Records, commanded_path_mm, reach_mm, safety, stands_still
+from server.faults.watching import (
+    Records,
+    commanded_path_mm,
+    reach_mm,
+    reason,
+    safety,
+    stands_still,
+)
 
 _RESTART_S = 40.0
+_AXIS = (Event.TRACKING_ERROR, Event.TROCAR_LEFT, Event.CLEARANCE)
 
 
 def _in_plant(
@@ -74,6 +82,11 @@ def _noticed_late(bench: Bench, fault: Fault) -> Finding:
     if place is None:
         fault.mend(bench)
         finding.message = "nothing noticed it"
+        return finding
+    why = Event(int(reason(bench.watch.records()[place : place + 1])[0]))
+    if why not in _AXIS:
+        fault.mend(bench)
+        finding.message = f"another cause came first: {REASONS[why][0]}"
         return finding
     first_ns = stamp(bench.watch.records()[place : place + 1])
     passed = np.flatnonzero(_exceeds(bench)[: place + 1])
@@ -246,7 +259,7 @@ CONTROL_FAULTS = (
     _in_plant("encoder-jump", "An encoder jumps", Event.TRACKING_ERROR, Safety.FAULT,
               also=(Event.TROCAR_LEFT, Event.CLEARANCE)),
     _in_plant("arm-pushed", "Something pushes the arm off the trocar", Event.TROCAR_LEFT,
-              Safety.FAULT, deadline=Deadline.LEADER),
+              Safety.FAULT, also=(Event.TRACKING_ERROR,), deadline=Deadline.LEADER),
     _in_plant("contact", "The instrument presses too hard", Event.CONTACT_FORCE, Safety.PAUSED,
               ),
     Fault(

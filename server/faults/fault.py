@@ -31,7 +31,7 @@ class Deadline(Enum):
     """Within which time a fault must be noticed."""
 
     LEADER = "the leader's time-out"
-    BUS = "two missed bus cycles and the deadline of a reply"
+    BUS = "two missed bus cycles"
     HANG_UP = "100 ms"
     WATCHDOG = "the servos' watchdog: 60 ms"
     LOST_WEB = "the web process may be silent for 1 s"

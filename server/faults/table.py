@@ -24,6 +24,7 @@ from server.faults.surroundings_faults import SURROUNDINGS_FAULTS
 from server.faults.system_faults import LAST_FAULTS, SYSTEM_FAULTS
 
 SCHEMA_VERSION = 1
+_ATTEMPTS = 3
 FAULTS: tuple[Fault, ...] = (
     *BUS_FAULTS,
     *STYLUS_FAULTS,
@@ -92,13 +93,22 @@ def run(
 
 
 def measured(bench: Bench, fault: Fault) -> dict[str, Any]:
-    """One row; what goes wrong with the injection itself is said in it, and the rest goes on."""
-    try:
-        finding = fault.measure(bench, fault)
-    except (KeyholeError, OSError, IndexError) as error:
-        with contextlib.suppress(KeyholeError, OSError):
-            fault.mend(bench)
-        finding = Finding(message=f"not measured: {error}")
+    """One row; what goes wrong with the injection itself is said in it, and the rest goes on.
+
+    Where the robot was stopped by something else, as on a busy machine a leader's late sample does,
+    nothing is known of the fault: it is injected again.
+    """
+    finding = Finding()
+    for attempt in range(1, _ATTEMPTS + 1):
+        try:
+            finding = fault.measure(bench, fault)
+        except (KeyholeError, OSError, IndexError) as error:
+            with contextlib.suppress(KeyholeError, OSError):
+                fault.mend(bench)
+            finding = Finding(message=f"not measured: {error}")
+        finding.attempts = max(finding.attempts, attempt)
+        if finding.detected and finding.recovered is not False:
+            break
     return row(fault, finding, bench.limit_ms(fault.deadline))
 
 
