@@ -174,6 +174,7 @@ def test_who_may_not_speak_is_refused_logged_and_shown(
 def test_a_second_operator_is_refused_logged_and_shown(
     operator: ApiClient, stream: ClientConnection, watcher: ApiClient
 ) -> None:
+    operator.done("POST", "/lease/renew")
     problem = watcher.refused("POST", "/lease", {"operator": "Eve"})
     assert (problem["status"], problem["code"]) == (409, "lease_held")
     words = "Eve (at 127.0.0.1) tried to take control"
