@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 from pathlib import Path
 
 from server.commands.progress_bar import ProgressBar
@@ -36,6 +37,8 @@ def execute(arguments: argparse.Namespace) -> int:
             print(f"{fault.group.value:<8} {fault.name:<28} {fault.title}")
         return 0
     faults = chosen([name for name in arguments.only.split(",") if name])
+    # Consoles and simulators end with us, however we are told to.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     bar = ProgressBar("faults")
 
     def progress(share: float, name: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 from pathlib import Path
 
 from server.commands.progress_bar import ProgressBar
@@ -41,6 +42,8 @@ def execute(arguments: argparse.Namespace) -> int:
     from server.configuration_file import load
     from server.faults.soak import printed, run
 
+    # Consoles and simulators end with us, however we are told to.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     bar = ProgressBar("soak")
 
     def progress(share: float, name: str) -> None:
