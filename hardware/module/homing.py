@@ -26,6 +26,8 @@ _TEST_LOAD = 0.05
 """How much more one servo is loaded to see who answers: friction in the gears hides less."""
 _ANSWERS = 0.3
 """Share of it that the tendon that answers shows at least."""
+_NOISE = 0.01
+"""Loads of servos that stand still differ by so much."""
 _SETTLE_S = 0.15
 _PAIRS = ((0, 2), (1, 3))
 _SHARE = 0.01 * TABLE["present_load"].unit_scale
@@ -93,7 +95,7 @@ class Homing:
         while loose < _SURE:
             tight = [index for index in range(SERVOS) if abs(self._pull[index]) > 0.5 * self._taut]
             loose = 0 if tight else loose + 1
-            if travel > self._pay_out:
+            if tight and travel > self._pay_out:
                 worst = max(tight, key=lambda index: abs(self._pull[index]))
                 if abs(self._pull[worst]) > abs(before[worst]):
                     raise WrongDirection(self._ids[worst], self._directions[worst])
@@ -140,8 +142,14 @@ class Homing:
         names = [self._ids[index] for index in slack]
         raise NeverTaut(names, self._range / self._ticks_per_deg)
 
+    def _settle(self) -> _Steps:
+        """Let the servos come to rest."""
+        for _ in range(self._settling):
+            yield
+
     def _pretension_pair(self, first: int, second: int) -> _Steps:
         """Pull ``first`` until it is loaded, see who is loaded by it, then share it out evenly."""
+        yield from self._settle()
         before = list(self._pull)
         wanted = max(self._pretension, before[first] + _TEST_LOAD)
         travel, sure = 0.0, 0
@@ -156,12 +164,12 @@ class Homing:
                 names = [self._ids[first]]
                 raise NeverTaut(names, self._range / self._ticks_per_deg)
             yield
-        for _ in range(self._settling):
-            yield
+        yield from self._settle()
         rise = [now - then for now, then in zip(self._pull, before, strict=True)]
         others = [index for index in range(SERVOS) if index != first]
         loaded = max(others, key=lambda index: rise[index])
-        if rise[first] > 0.0 and loaded != second and rise[loaded] > _ANSWERS * rise[first]:
+        least = max(_ANSWERS * rise[first], 2.0 * rise[second], _NOISE)
+        if loaded != second and rise[loaded] > least:
             raise WrongTendon(self._ids[first], self._ids[loaded], self._ids[second])
         shared = 0.0
         while shared < 0.5 * travel:
@@ -169,6 +177,4 @@ class Homing:
             self._move(first, -step)
             self._move(second, step)
             shared += step
-            yield
-        for _ in range(self._settling):
             yield

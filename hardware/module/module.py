@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hardware.devices import TEXT
+from hardware.module.module_servos import PATIENCE_S
 from hardware.module.worker import Command, ModuleWorker, Order
 from hardware.servos.control_table import TABLE
 from robot.configuration import Configuration
@@ -40,9 +41,15 @@ class InstrumentModule:
     servos are.
     """
 
-    def __init__(self, configuration: Configuration) -> None:
-        """Begin to look for the servos; real-time scheduling as ``[control] realtime`` says."""
-        self._worker = ModuleWorker(configuration, configuration.control.realtime != "off")
+    def __init__(self, configuration: Configuration, patience_s: float = PATIENCE_S) -> None:
+        """Begin to look for the servos; real-time scheduling as ``[control] realtime`` says.
+
+        Args:
+            configuration: of the bus and the module.
+            patience_s: how late an answer of the servos may be.
+        """
+        realtime = configuration.control.realtime != "off"
+        self._worker = ModuleWorker(configuration, realtime, patience_s)
         self._settings = configuration.servos
 
     def read(self, out_servo: np.ndarray, out_load: np.ndarray) -> ModuleReading:

@@ -16,7 +16,6 @@ from hardware.module.homing import Homing
 from hardware.module.preparation import (
     Prepared,
     ServoStatus,
-    arm_watchdogs,
     prepare,
     read_status,
     reboot_all,
@@ -34,7 +33,7 @@ from robot.configuration import Configuration
 from robot.records import SERVOS, Readiness
 from robot.safety import Event
 
-_PATIENCE_S, _PATIENCE_PERIODS = 0.006, 1.5
+PATIENCE_S, _PATIENCE_PERIODS = 0.006, 1.5
 """How late an answer may be. At 250 Hz two misses are found out within the 25 ms of the stylus."""
 _RESERVE = 1.3
 """How much faster than commands may be the goals may catch up."""
@@ -65,8 +64,13 @@ class ModuleServos:
         stamps_ns: when each servo answered last.
     """
 
-    def __init__(self, configuration: Configuration) -> None:
-        """Servos that have never been connected."""
+    def __init__(self, configuration: Configuration, patience_s: float = PATIENCE_S) -> None:
+        """Servos that have never been connected.
+
+        Args:
+            configuration: of the bus and the module.
+            patience_s: how late an answer may be; more where it lasts longer than a cycle.
+        """
         self.settings = configuration.servos
         self.transmission = Transmission(configuration)
         speed = math.radians(configuration.module.servo_speed_deg_s) * _RESERVE
@@ -82,7 +86,7 @@ class ModuleServos:
         self.stamps_ns = [0] * SERVOS
         self._period_s = 1.0 / self.settings.rate_hz
         self._slack = _SLACK_RAD * self.transmission.ticks_per_rad
-        self._patience_s = max(_PATIENCE_S, _PATIENCE_PERIODS * self._period_s)
+        self._patience_s = max(patience_s, _PATIENCE_PERIODS * self._period_s)
         self._limit = (
             self.transmission.half_range + _TOLERANCE_RAD * self.transmission.ticks_per_rad
         )
@@ -122,7 +126,6 @@ class ModuleServos:
         self.follower.hold(self.prepared.goals, (0,) * SERVOS)
         self.cycle.position[:] = self.prepared.position
         self.watch.forget(self.cycle, self.follower.goals)
-        arm_watchdogs(bus, self.settings)
         self._last_ns = time.monotonic_ns()
         self.stamps_ns = [self._last_ns] * SERVOS
 

@@ -18,7 +18,6 @@ from hardware.servos.control_table import (
     PRESENT,
     TABLE,
     TICKS_PER_TURN,
-    WATCHDOG_TRIPPED,
     WATCHDOG_UNIT_MS,
     HardwareError,
     OperatingMode,
@@ -129,7 +128,6 @@ def prepare(bus: ServoBus, settings: Servos) -> Prepared:
         _write_eeprom(bus, servo, state.torque)
     velocity = max(1, round(settings.profile_velocity_deg_s / _VELOCITY_UNIT_DEG_S))
     for servo in ids:
-        bus.write(servo, "bus_watchdog", 0)
         bus.write(servo, "profile_acceleration", 0)
         bus.write(servo, "profile_velocity", velocity)
     position = tuple(bus.read(servo, "present_position") for servo in ids)
@@ -137,9 +135,13 @@ def prepare(bus: ServoBus, settings: Servos) -> Prepared:
         _read_resting_goal(bus, servo, tick, state.torque)
         for servo, tick, state in zip(ids, position, status, strict=True)
     )
+    units = max(1, settings.watchdog_ms // WATCHDOG_UNIT_MS)
     for servo, goal, state in zip(ids, goals, status, strict=True):
+        # A servo that its watchdog has stopped takes no goal before it is cleared.
+        bus.write(servo, "bus_watchdog", 0)
         if not state.error:
             bus.write(servo, "goal_position", goal)
+        bus.write(servo, "bus_watchdog", units)
     size = PRESENT[1] - PRESENT[0]
     fast = len(bus.fast_sync_read(PRESENT[0], size, ids)) == len(ids)
     return Prepared(found, status, position, goals, fast)
@@ -173,33 +175,10 @@ def _write_eeprom(bus: ServoBus, servo: int, torque: bool) -> None:
         bus.write(servo, name, _EEPROM[name])
 
 
-def arm_watchdogs(bus: ServoBus, settings: Servos) -> None:
-    """Let the servos stop by themselves when the bus falls silent. Errors as ``write``."""
-    units = max(1, settings.watchdog_ms // WATCHDOG_UNIT_MS)
-    for servo in settings.ids:
-        bus.write(servo, "bus_watchdog", units)
-
-
 def disarm_watchdogs(bus: ServoBus, ids: Sequence[int]) -> None:
     """Let the servos hold without the host, as before it leaves. Errors as ``write``."""
     for servo in ids:
         bus.write(servo, "bus_watchdog", 0)
-
-
-def clear_watchdogs(bus: ServoBus, settings: Servos) -> bool:
-    """Make servos listen again that stopped because the bus was silent; True if there were any.
-
-    Their goals become where they stand. Errors as ``write``.
-    """
-    tripped = [
-        servo for servo in settings.ids if bus.read(servo, "bus_watchdog") == WATCHDOG_TRIPPED
-    ]
-    for servo in tripped:
-        bus.write(servo, "bus_watchdog", 0)
-        bus.write(servo, "goal_position", bus.read(servo, "present_position"))
-    if tripped:
-        arm_watchdogs(bus, settings)
-    return bool(tripped)
 
 
 def torque_on(bus: ServoBus, ids: Sequence[int]) -> None:

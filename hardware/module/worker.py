@@ -19,7 +19,7 @@ import numpy as np
 from hardware.devices import DeviceState
 from hardware.module.cycle_times import CycleTimes
 from hardware.module.errors import ModuleError
-from hardware.module.module_servos import ModuleServos
+from hardware.module.module_servos import PATIENCE_S, ModuleServos
 from hardware.module.preparation import disarm_watchdogs, release_all
 from hardware.module.scheduling import prefer_this_thread
 from hardware.module.search import BusSearch
@@ -92,15 +92,21 @@ class ModuleWorker:
         realtime: whether the thread runs under SCHED_FIFO.
     """
 
-    def __init__(self, configuration: Configuration, realtime: bool = True) -> None:
+    def __init__(
+        self,
+        configuration: Configuration,
+        realtime: bool = True,
+        patience_s: float = PATIENCE_S,
+    ) -> None:
         """Start to search.
 
         Args:
             configuration: of the bus and the module.
             realtime: whether to ask for real-time scheduling.
+            patience_s: how late an answer of the servos may be.
         """
         zeros = (0.0,) * SERVOS
-        self.servos = ModuleServos(configuration)
+        self.servos = ModuleServos(configuration, patience_s)
         self.times = CycleTimes()
         self.counters = Counters()
         self.command = Command(0, zeros, False)
@@ -144,6 +150,10 @@ class ModuleWorker:
                 self._not_connected(str(error))
                 if not isinstance(error, PortLost):
                     self._closing.wait(_SEARCH_S)
+            except Exception as error:
+                # The servos stop by themselves; their last measurement must not count any more.
+                self._not_connected(f"the driver failed: {error!r}; start the console again")
+                raise
             finally:
                 bus.port.close()
 

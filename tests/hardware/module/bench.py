@@ -20,6 +20,8 @@ from server.configuration_file import load
 
 _PATIENCE_S = 30.0
 _TICK_S = 0.002
+BUS_PATIENCE_S = 0.15
+"""Longer than a busy machine lets the simulator wait."""
 IDS = (101, 102, 103, 104)
 
 
@@ -28,9 +30,9 @@ def settings(port: Path, **changes: Any) -> Configuration:
     configuration = load()
     patient = {
         "port": str(port),
-        "rate_hz": 50.0,
-        "watchdog_ms": 400,
-        "homing_speed_deg_s": 80.0,
+        "rate_hz": 100.0,
+        "watchdog_ms": 2000,
+        "homing_speed_deg_s": 90.0,
         "profile_velocity_deg_s": 360.0,
     }
     servos = configuration.servos.model_copy(update=patient | changes)
@@ -107,7 +109,8 @@ class Bench:
         self.until(lambda reading: reading.readiness != Readiness.NOT_CONNECTED)
         self.until(lambda reading: reading.event == 0)
         if self.read().readiness != Readiness.READY:
-            assert self.home() == ""
+            message = self.home()
+            assert self.read().readiness == Readiness.READY, message
         self.read()
         self.command[:] = self.angles
         self.rest()
@@ -138,9 +141,11 @@ def bench(*arguments: str, **changes: Any) -> Iterator[Bench]:
     """A simulator started with ``arguments`` and a module configured with ``changes``."""
     with TemporaryDirectory() as folder:
         link = Path(folder) / "ttyFAKE0"
-        with FakeServosProcess(link, *arguments) as process:
+        # Little slack: homing is not what most tests are about.
+        slack = ("--slack-mm", "0.2,0.4,0.3,0.1")
+        with FakeServosProcess(link, *slack, *arguments) as process:
             pattern = Path(folder) / "ttyFAKE*[0-9]"
-            module = InstrumentModule(settings(pattern, **changes))
+            module = InstrumentModule(settings(pattern, **changes), BUS_PATIENCE_S)
             try:
                 yield Bench(module, process.servos)
             finally:

@@ -13,21 +13,16 @@ from hardware.devices import DeviceState
 from hardware.fake_servos.client import FakeServosProcess
 from hardware.module.module import InstrumentModule
 from robot.records import Readiness
-from tests.hardware.module.bench import IDS, Bench, bench, settings
+from robot.safety import Event
+from tests.hardware.module.bench import BUS_PATIENCE_S, IDS, Bench, bench, settings
 
 
 @pytest.fixture(scope="module")
 def shared() -> Iterator[Bench]:
+    """Of this file's own: a segment that no fault has bent."""
     with bench() as made:
         made.until(lambda reading: reading.readiness == Readiness.NOT_HOMED)
-        made.ready()
         yield made
-
-
-@pytest.fixture
-def homed(shared: Bench) -> Bench:
-    shared.ready()
-    return shared
 
 
 def test_homing_leaves_every_tendon_taut_and_the_segment_nearly_straight(homed: Bench) -> None:
@@ -37,7 +32,6 @@ def test_homing_leaves_every_tendon_taut_and_the_segment_nearly_straight(homed: 
     assert max(abs(bend) for bend in state["bend_rad"]) < math.radians(12.0)
     homed.read()
     assert np.all(homed.loads < -0.05)
-    assert np.all(np.abs(homed.angles) < math.radians(3.0))
 
 
 def test_a_motion_is_followed_and_bends_the_segment_the_right_way(homed: Bench) -> None:
@@ -119,19 +113,25 @@ def test_a_slack_tendon_is_found_at_homing() -> None:
         assert "not taut after 60 deg" in made.home()
 
 
-def test_a_host_that_is_started_again_finds_the_zero_with_the_servos(tmp_path: Path) -> None:
+def test_the_zero_outlives_the_host_but_not_the_servos_power(tmp_path: Path) -> None:
     link = tmp_path / "ttyFAKE0"
     with FakeServosProcess(link) as process:
         for homed_before in (False, True):
-            module = InstrumentModule(settings(link))
-            try:
-                made = Bench(module, process.servos)
-                made.until(lambda reading: reading.readiness != Readiness.NOT_CONNECTED)
-                assert (made.read().readiness == Readiness.READY) == homed_before
-                made.ready()
-                assert np.all(np.abs(made.angles) < math.radians(6.0))
-            finally:
+            module = InstrumentModule(settings(link), BUS_PATIENCE_S)
+            made = Bench(module, process.servos)
+            made.until(lambda reading: reading.readiness != Readiness.NOT_CONNECTED)
+            assert (made.read().readiness == Readiness.READY) == homed_before
+            made.ready()
+            assert np.all(np.abs(made.angles) < math.radians(6.0))
+            if not homed_before:
                 module.close()
+    try:
+        made.until(lambda reading: reading.event == Event.BUS_LOST)
+        with FakeServosProcess(link):
+            made.until(lambda reading: reading.readiness == Readiness.NOT_HOMED)
+            assert "lost their torque" in made.message
+    finally:
+        module.close()
 
 
 def test_servos_of_the_factory_are_set_up_without_touching_their_torque() -> None:
@@ -140,4 +140,4 @@ def test_servos_of_the_factory_are_set_up_without_touching_their_torque() -> Non
         state = made.servos.state()["servos"]
         assert not any(servo["torque"] for servo in state)
         assert {servo["operating_mode"] for servo in state} == {3}
-        assert {servo["bus_watchdog"] for servo in state} == {20}
+        assert {servo["bus_watchdog"] for servo in state} == {100}
