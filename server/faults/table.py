@@ -72,7 +72,11 @@ def run(
     started = time.monotonic()
     base = bench_configuration(configuration or load())
     rows: list[dict[str, Any]] = []
-    with tempfile.TemporaryDirectory(prefix="keyhole-faults-") as folder:
+    with (
+        tempfile.TemporaryDirectory(prefix="keyhole-faults-") as folder,
+        # Who interrupts it gets what was measured until then.
+        contextlib.suppress(KeyboardInterrupt),
+    ):
         for kind in ("simulated", "hardware"):
             own = [fault for fault in faults if fault.needs == kind]
             if not own:
@@ -86,7 +90,8 @@ def run(
         "schema_version": SCHEMA_VERSION,
         "machine": {"system": platform.platform(), "python": platform.python_version()},
         "seconds": round(time.monotonic() - started, 1),
-        "met": all(one["met"] for one in rows),
+        "complete": len(rows) == len(faults),
+        "met": len(rows) == len(faults) and all(one["met"] for one in rows),
         "undetected": [one["fault"] for one in rows if not one["detected"]],
         "faults": rows,
     }
