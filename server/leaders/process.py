@@ -66,6 +66,11 @@ class StylusLeader:
         self._force: Force = NO_FORCE
         self._servos_sent: list[float] = []
 
+    @property
+    def enabled(self) -> bool:
+        """Whether the robot was ENABLED when it was last looked."""
+        return self._view.enabled
+
     def step(self, wait_s: float = _TICK_S) -> None:
         """Wait for what comes next, no longer than ``wait_s``, and take it in."""
         connection = self._connection
