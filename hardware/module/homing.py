@@ -40,11 +40,27 @@ class Homing:
 
     Attributes:
         goals: ticks for the next cycle; when it is done, the zero.
+        origin: ticks at which the segment is taken to be straight before it begins.
         progress: 0 to 1.
     """
 
-    def __init__(self, transmission: Transmission, settings: Servos, dt_s: float) -> None:
-        """Prepare to be called every ``dt_s``."""
+    def __init__(
+        self,
+        transmission: Transmission,
+        settings: Servos,
+        dt_s: float,
+        origin: Sequence[float] | None = None,
+    ) -> None:
+        """Prepare to be called every ``dt_s``.
+
+        Args:
+            transmission: directions of the servos.
+            settings: speeds and loads.
+            dt_s: between two cycles.
+            origin: ticks at which the segment was straight before, if that is known; where a homing
+                that was broken off has begun, or the last zero. It goes there first.
+        """
+        self.origin = None if origin is None else list(origin)
         self.goals = [0.0] * SERVOS
         self.progress = 0.0
         self._directions, self._ids = transmission.directions, settings.ids
@@ -72,10 +88,12 @@ class Homing:
             self._pull[index] = -direction * load[index] * _SHARE
         if not self._started:
             self.goals[:] = position
+            self.origin = self.origin or list(self.goals)
             self._started = True
         return next(self._steps, True) is not None
 
     def _run(self) -> _Steps:
+        yield from self._go_back()
         yield from self._let_out()
         self.progress = 0.1
         yield from self._tighten()
@@ -87,6 +105,21 @@ class Homing:
     def _move(self, index: int, ticks: float) -> None:
         """Pull (or let out, where negative) one tendon."""
         self.goals[index] -= self._directions[index] * ticks
+
+    def _go_back(self) -> _Steps:
+        """Undo what an earlier homing or motion has bent; no tendon is pulled harder than taut."""
+        assert self.origin is not None
+        left = True
+        while left:
+            left = False
+            for index in range(SERVOS):
+                way = self.origin[index] - self.goals[index]
+                pulls = way * self._directions[index] < 0.0
+                if abs(way) < 1.0 or (pulls and self._pull[index] >= self._pretension):
+                    continue
+                self.goals[index] += min(max(way, -self._step), self._step)
+                left = True
+            yield
 
     def _let_out(self) -> _Steps:
         """Let go of what is under tension already, so that the segment is free to be straight."""

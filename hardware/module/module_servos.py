@@ -91,6 +91,7 @@ class ModuleServos:
             self.transmission.half_range + _TOLERANCE_RAD * self.transmission.ticks_per_rad
         )
         self._released = self._silent = False
+        self._origin: list[float] | None = None
         self._until_ns = 0
         self._last_ns = 0
         self._gap_ns = round(0.75e6 * self.settings.watchdog_ms)
@@ -139,6 +140,7 @@ class ModuleServos:
         except NoRoom:
             return
         self.homed = True
+        self._origin = [float(tick) for tick in zero]
         self.message = "the servos held on; enable to go on"
 
     def disconnect(self) -> None:
@@ -320,15 +322,17 @@ class ModuleServos:
         self.homed = False
         forget_zero(self._bus, self.settings)
         self.message = "homing"
-        self.homing = Homing(self.transmission, self.settings, self._period_s)
+        self.homing = Homing(self.transmission, self.settings, self._period_s, self._origin)
 
     def _home_on(self, cycle: CyclicExchange) -> None:
         assert self.homing is not None
         try:
             done = self.homing.step(cycle.position, cycle.load)
             self.follower.take(self.homing.goals)
+            self._origin = self.homing.origin
             if done:
                 self.transmission.set_zero(self.follower.goals)
+                self._origin = list(self.homing.goals)
                 self.homed, self.message = True, ""
                 self.homing = None
                 remember_zero(self._bus, self.settings, self.transmission.zero)
