@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import math
 import threading
 import time
@@ -29,6 +30,10 @@ Tamper = Callable[[Sample, int], Sample | None]
 PERIOD_S = 0.008
 _RADIUS_MM, _TURN_S, _BACK_S = 8.0, 2.5, 0.6
 _SWING_RAD, _SWING_S = 1.4, 4.0
+_SILENT = logging.getLogger("keyhole.faults.leader")
+"""A connection that is cut on purpose is nothing to report."""
+_SILENT.addHandler(logging.NullHandler())
+_SILENT.propagate = False
 _HEARTBEAT_S, _RENEW_S, _RETRY_S = 0.4, 2.0, 0.1
 
 
@@ -138,6 +143,7 @@ class StreamLeader:
                     open_timeout=2.0,
                     close_timeout=0.2,
                     ping_interval=None,
+                    logger=_SILENT,
                 ) as socket:
                     self._socket = socket
                     threading.Thread(target=self._read, args=(socket,), daemon=True).start()

@@ -7,7 +7,7 @@ import json
 from server.configuration_file import load
 from server.faults.soak import printed, run
 
-SECONDS = 18.0
+SECONDS = 8.0
 
 
 def test_nothing_is_lost_while_one_thing_after_the_other_breaks() -> None:
