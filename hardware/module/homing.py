@@ -70,6 +70,7 @@ class Homing:
         self._pay_out = _PAY_OUT_DEG * ticks_per_deg
         self._ticks_per_deg = ticks_per_deg
         self._taut = 0.01 * settings.taut_load_percent
+        self._most = 0.005 * (settings.pretension_load_percent + settings.load_limit_percent)
         self._pretension = 0.01 * settings.pretension_load_percent
         self._settling = math.ceil(_SETTLE_S / dt_s)
         self._pull = [0.0] * SERVOS
@@ -107,7 +108,7 @@ class Homing:
         self.goals[index] -= self._directions[index] * ticks
 
     def _go_back(self) -> _Steps:
-        """Undo what an earlier homing or motion has bent; no tendon is pulled harder than taut."""
+        """Undo what an earlier homing or motion has bent; no tendon is pulled near its limit."""
         assert self.origin is not None
         left = True
         while left:
@@ -115,7 +116,7 @@ class Homing:
             for index in range(SERVOS):
                 way = self.origin[index] - self.goals[index]
                 pulls = way * self._directions[index] < 0.0
-                if abs(way) < 1.0 or (pulls and self._pull[index] >= self._pretension):
+                if abs(way) < 1.0 or (pulls and self._pull[index] > self._most):
                     continue
                 self.goals[index] += min(max(way, -self._step), self._step)
                 left = True
@@ -133,26 +134,32 @@ class Homing:
                 if abs(self._pull[worst]) > abs(before[worst]):
                     raise WrongDirection(self._ids[worst], self._directions[worst])
                 raise NeverTaut([self._ids[worst]], 0.0)
-            for index in tight:
-                self._move(index, -self._step)
-            travel += self._step
+            if tight:
+                # All alike, which keeps straight what is straight.
+                for index in range(SERVOS):
+                    self._move(index, -self._step)
+                travel += self._step
             yield
 
     def _tighten(self) -> _Steps:
-        """Pull all tendons until each is taut."""
-        sure, travel = [0] * SERVOS, 0.0
+        """Pull opposite tendons alike until both are taut: a free segment shares the load out."""
+        sure, travel = [0, 0], 0.0
         while min(sure) < _SURE:
-            for index in range(SERVOS):
-                if sure[index] >= _SURE:
+            for pair, (first, second) in enumerate(_PAIRS):
+                loads = self._pull[first], self._pull[second]
+                if sure[pair] >= _SURE:
                     continue
-                if self._pull[index] >= self._taut:
-                    sure[index] += 1
-                else:
-                    sure[index] = 0
-                    self._move(index, self._step)
+                if sum(loads) >= 2.0 * self._taut and min(loads) >= 0.5 * self._taut:
+                    sure[pair] += 1
+                    continue
+                sure[pair] = 0
+                for index in (first, second):
+                    if self._pull[index] < self._pretension:
+                        self._move(index, self._step)
             travel += self._step
             if travel > self._range:
-                yield from self._explain([index for index in range(SERVOS) if sure[index] < _SURE])
+                slack = [index for index in range(SERVOS) if self._pull[index] < 0.5 * self._taut]
+                yield from self._explain(slack or list(range(SERVOS)))
             yield
 
     def _explain(self, slack: list[int]) -> _Steps:

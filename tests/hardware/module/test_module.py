@@ -43,6 +43,15 @@ def test_a_motion_is_followed_and_bends_the_segment_the_right_way(homed: Bench) 
     assert abs(after[1] - before[1]) < 0.1
 
 
+def test_homing_again_from_a_bend_finds_straight_again(homed: Bench) -> None:
+    homed.drive_to((-0.2, 0.0, 0.2, 0.0))
+    assert homed.servos.state()["bend_rad"][0] > 0.3
+    homed.rest()
+    homed.home()
+    homed.ready()
+    assert max(abs(bend) for bend in homed.servos.state()["bend_rad"]) < math.radians(12.0)
+
+
 def test_what_is_not_a_motion_is_not_followed(homed: Bench) -> None:
     goals = homed.goals()
     homed.command[:] += 0.2
