@@ -199,6 +199,8 @@ def _wrong_sign(bench: Bench, fault: Fault) -> Finding:
     finding.detected = not enabled.ok
     finding.detected_within_ms = 0.0 if finding.detected else None
     finding.state = bench.now()[0].name
+    # The devices' report comes ten times a second.
+    time.sleep(_SETTLE_S)
     finding.message = bench.bus_text("message")
     finding.remark = f"found while homing, {took_ms * 1e-3:.1f} s after its beginning"
     records = bench.watch.records()
@@ -283,11 +285,13 @@ BUS_FAULTS = (
     _stopping("servo-silent", "One servo says nothing", _inject("silent", servo=_SERVO),
               (Event.SERVO_SILENT,), Safety.FAULT),
     Fault("encoder-stuck", Group.BUS, "A servo's encoder is stuck", _encoder, Deadline.BUS,
-          begin=_inject("encoder-stuck", servo=101), mend=_clear, needs="hardware"),
+          begin=_inject("encoder-stuck", servo=101), mend=_clear, state=Safety.FAULT,
+          needs="hardware"),
     Fault("wrong-sign", Group.BUS, "A servo is mounted the other way round", _wrong_sign,
-          Deadline.BUS, begin=_inject("reversed", servo=_SERVO), mend=_clear, needs="hardware"),
+          Deadline.BUS, begin=_inject("reversed", servo=_SERVO), mend=_clear, state=Safety.DISABLED,
+          needs="hardware"),
     Fault("host-killed", Group.BUS, "SIGKILL of the control process under way",
-          _host_gone(signal.SIGKILL), Deadline.WATCHDOG, needs="hardware"),
+          _host_gone(signal.SIGKILL), Deadline.WATCHDOG, state=Safety.DISABLED, needs="hardware"),
     Fault("host-hung", Group.BUS, "The control process hangs under way",
-          _host_gone(signal.SIGSTOP), Deadline.WATCHDOG, needs="hardware"),
+          _host_gone(signal.SIGSTOP), Deadline.WATCHDOG, state=Safety.DISABLED, needs="hardware"),
 )  # fmt: skip

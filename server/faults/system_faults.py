@@ -240,6 +240,7 @@ SYSTEM_FAULTS = (
         "SIGKILL of the control process",
         _killed_control,
         Deadline.HANG_UP,
+        state=Safety.DISABLED,
     ),
     Fault(
         "control-hung",
@@ -247,6 +248,7 @@ SYSTEM_FAULTS = (
         "The control process hangs",
         _hung_control,
         Deadline.HUNG,
+        state=Safety.DISABLED,
     ),
     Fault(
         "control-ended",
@@ -254,9 +256,17 @@ SYSTEM_FAULTS = (
         "SIGTERM of the control process",
         _ended_control,
         Deadline.HANG_UP,
+        state=Safety.DISABLED,
     ),
 )
 LAST_FAULTS = (
-    Fault("sigterm", Group.SYSTEM, "SIGTERM of the console", _sigterm, Deadline.HANG_UP),
+    Fault(
+        "sigterm",
+        Group.SYSTEM,
+        "SIGTERM of the console",
+        _sigterm,
+        Deadline.HANG_UP,
+        state=Safety.DISABLED,
+    ),
 )
 """After these there is no console any more."""
