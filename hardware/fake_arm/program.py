@@ -16,11 +16,11 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from hardware.arm.address import NORMAL_PORT, REAL_PORT, RICH_PORT, ArmAddress
+from hardware.control_channel import BadRequest, ControlChannel
 from hardware.fake_arm import telling
 from hardware.fake_arm.controller import Controller
 from hardware.fake_arm.faults import FAULTS, Wanted, check_name
 from hardware.fake_arm.wire import PROTOCOLS, Register, Request, RequestReader, answer
-from hardware.fake_servos.control_channel import BadRequest, ControlChannel
 from robot.errors import KeyholeError
 
 _REAL_NS, _SLOW_NS = 10_000_000, 200_000_000

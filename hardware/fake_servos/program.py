@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hardware.fake_servos.control_channel import BadRequest, ControlChannel
+from hardware.control_channel import BadRequest, ControlChannel
 from hardware.fake_servos.faults import Fault, Faults, Kind, make, parse
 from hardware.fake_servos.pseudo_terminal import PseudoTerminal
 from hardware.fake_servos.servo import Servo

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 import msgspec
 
-from hardware.fake_servos.control_channel import BadRequest, ControlChannel
+from hardware.control_channel import BadRequest, ControlChannel
 from server.fake_stylus.device import FakeStylus, Sample
 from server.fake_stylus.faults import Fault, Faults, make, parse
 from server.fake_stylus.wording import OwnWording, RosWording, as_null, number

@@ -9,18 +9,15 @@ from __future__ import annotations
 
 import argparse
 import gc
-import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from robot.configuration import Stylus
-from robot.errors import KeyholeError
 from robot.records import LeaderKind
-from server.control.lifeline import Lifeline
 from server.control.realtime import PRIORITY, enter, prefer
 from server.leaders import rosbridge
 from server.leaders.connection import Connection, ConnectionFailed, connect, wait
@@ -30,6 +27,7 @@ from server.leaders.status import SAY_NS, StylusReport, StylusStatusFile
 from server.leaders.stylus_input import StylusInput
 from server.memory.leader_slot import LeaderSlot
 from server.memory.run_directory import RunDirectory
+from server.supervision.child_main import Stopped, child_parser, run_child
 
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.25, 4.0
 """Between two attempts to connect; each is twice as long as the one before."""
@@ -209,12 +207,8 @@ class StylusLeader:
         self._view.close()
 
 
-def lead(directory: RunDirectory, stopped: Callable[[], bool]) -> None:
-    """Lead by the configured stylus until ``stopped``.
-
-    Raises:
-        KeyholeError: the run directory holds no console.
-    """
+def _lead(arguments: argparse.Namespace, stopped: Stopped) -> None:
+    directory = RunDirectory(arguments.run_directory)
     configuration = directory.configuration()
     leader = StylusLeader(directory.path, configuration.stylus)
     # On a busy machine samples otherwise come late, which control must take for silence.
@@ -228,30 +222,8 @@ def lead(directory: RunDirectory, stopped: Callable[[], bool]) -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """``python -m server.leaders.process --run-directory DIR [--lifeline-fd N]``.
-
-    Returns:
-        0 when it was asked to end, 2 when it could not start.
-    """
-    parser = argparse.ArgumentParser(prog="keyhole leader")
-    parser.add_argument("--run-directory", required=True, type=Path)
-    parser.add_argument("--lifeline-fd", type=int)
-    arguments = parser.parse_args(argv)
-    ending: list[int] = []
-    for ignored in (signal.SIGINT, signal.SIGHUP):
-        # The supervisor gets them too, and ends everything in order.
-        signal.signal(ignored, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda number, _: ending.append(number))
-    lifeline = Lifeline(arguments.lifeline_fd)
-    try:
-        lead(
-            RunDirectory(arguments.run_directory),
-            lambda: bool(ending) or lifeline.is_cut(),
-        )
-    except KeyholeError as error:
-        print(f"keyhole leader: {error}", file=sys.stderr, flush=True)
-        return 2
-    return 0
+    """``python -m server.leaders.process --run-directory DIR [--lifeline-fd N]``."""
+    return run_child(child_parser("leader"), argv, _lead)
 
 
 if __name__ == "__main__":

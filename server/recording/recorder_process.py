@@ -22,7 +22,6 @@ from robot.errors import KeyholeError
 from robot.records import RECORD
 from server.audit.transitions import TransitionWatch
 from server.audit.writer import AuditLog
-from server.control.lifeline import Lifeline
 from server.memory.link_records import RECORD_RING_FILE, STATUS, STATUS_FILE
 from server.memory.mapped import MappedReadError, MappedRing, MappedSlot
 from server.memory.recording_link import (
@@ -39,6 +38,7 @@ from server.recording.errors import RecordingError, RecordingNotWritten
 from server.recording.folder import following
 from server.recording.reader import Recording
 from server.recording.writer import CHUNK_S, RecordingWriter
+from server.supervision.child_main import Stopped, child_parser, run_child
 
 _PERIOD_S = 0.05
 _SAY_S = 0.2
@@ -222,40 +222,25 @@ class Recorder:
         self._say()
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """``python -m server.recording.recorder_process --run-directory DIR [--lifeline-fd N]``.
-
-    Returns:
-        0 when it was asked to end, 2 when it could not start.
-    """
-    parser = argparse.ArgumentParser(prog="keyhole recorder")
-    parser.add_argument("--run-directory", required=True, type=Path)
-    parser.add_argument("--lifeline-fd", type=int)
-    arguments = parser.parse_args(argv)
-    ending: list[int] = []
-    for ignored in (signal.SIGINT, signal.SIGHUP):
-        # The supervisor gets them too, and ends everything in order.
-        signal.signal(ignored, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda number, _: ending.append(number))
+def _record(arguments: argparse.Namespace, stopped: Stopped) -> None:
     # A file that may not grow further must be an error, not the end of the process.
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    lifeline = Lifeline(arguments.lifeline_fd)
-    try:
-        directory = RunDirectory(arguments.run_directory)
-        recorder = Recorder(directory)
-        audit = AuditLog.of_console("recorder", directory.path)
-        transitions = TransitionWatch(directory.path, audit)
-        while not ending and not lifeline.is_cut():
-            recorder.step()
-            transitions.step()
-            time.sleep(_PERIOD_S)
-        recorder.close()
+    directory = RunDirectory(arguments.run_directory)
+    recorder = Recorder(directory)
+    audit = AuditLog.of_console("recorder", directory.path)
+    transitions = TransitionWatch(directory.path, audit)
+    while not stopped():
+        recorder.step()
         transitions.step()
-        audit.close()
-    except KeyholeError as error:
-        print(f"keyhole recorder: {error}", file=sys.stderr, flush=True)
-        return 2
-    return 0
+        time.sleep(_PERIOD_S)
+    recorder.close()
+    transitions.step()
+    audit.close()
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """``python -m server.recording.recorder_process --run-directory DIR [--lifeline-fd N]``."""
+    return run_child(child_parser("recorder"), argv, _record)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import math
 import os
-import signal
 import sys
 import time
 from collections import OrderedDict
@@ -19,9 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from robot.errors import KeyholeError
 from robot.records import RECORD
-from server.control.lifeline import Lifeline
 from server.memory.link_records import (
     RECORD_RING_FILE,
     RECORD_SLOT_FILE,
@@ -38,6 +35,7 @@ from server.memory.replay_link import (
     read_replay,
 )
 from server.recording.reader import Batch, Recording
+from server.supervision.child_main import Stopped, child_parser, run_child
 
 SLOWEST, FASTEST = 0.1, 10.0
 """Speeds of a replay, recorded time over real time."""
@@ -168,34 +166,20 @@ class Replay:
         self._replay.write(said)
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """``python -m server.recording.replay_process --run-directory DIR --file FILE ...``.
+def _show(arguments: argparse.Namespace, stopped: Stopped) -> None:
+    with Recording(arguments.file) as recording:
+        replay = Replay(arguments.run_directory, recording)
+        replay.announce()
+        while not stopped():
+            replay.step(time.monotonic())
+            time.sleep(_PERIOD_S)
 
-    Returns:
-        0 when it was asked to end, 2 when it could not start or go on.
-    """
-    parser = argparse.ArgumentParser(prog="keyhole replay")
-    parser.add_argument("--run-directory", required=True, type=Path)
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """``python -m server.recording.replay_process --run-directory DIR --file FILE ...``."""
+    parser = child_parser("replay")
     parser.add_argument("--file", required=True, type=Path)
-    parser.add_argument("--lifeline-fd", type=int)
-    arguments = parser.parse_args(argv)
-    ending: list[int] = []
-    for ignored in (signal.SIGINT, signal.SIGHUP):
-        # The supervisor gets them too, and ends everything in order.
-        signal.signal(ignored, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda number, _: ending.append(number))
-    lifeline = Lifeline(arguments.lifeline_fd)
-    try:
-        with Recording(arguments.file) as recording:
-            replay = Replay(arguments.run_directory, recording)
-            replay.announce()
-            while not ending and not lifeline.is_cut():
-                replay.step(time.monotonic())
-                time.sleep(_PERIOD_S)
-    except KeyholeError as error:
-        print(f"keyhole replay: {error}", file=sys.stderr, flush=True)
-        return 2
-    return 0
+    return run_child(parser, argv, _show)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""A local socket over which tests and people break the bus and look at what the servos did.
+"""A local socket over which tests and people break what is simulated and look at what it did.
 
 One JSON object a line each way; every answer has ``ok`` and ``stamp_ns``, the monotonic time of the
-act. ``client.py`` is the other end.
+act. ``hardware.fake_servos.client`` is the other end.
 """
 
 from __future__ import annotations
