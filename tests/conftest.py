@@ -40,6 +40,7 @@ def chromium() -> str:
     return path
 
 
+@pytest.hookimpl(tryfirst=True)  # xdist reads the marks in the same hook
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Keep together on one processor what shares a console or a file's fixtures."""
     for item in items:

@@ -31,7 +31,7 @@ from server.memory.mapped import MappedReadError, MappedSlot
 from server.memory.stylus_records import STYLUS_STATUS, STYLUS_STATUS_FILE
 
 _ARM_S, _RECOVER_S = 25.0, 60.0
-_REPLY_MS = 10.0
+_REPLY_MS = 8.0
 """How long a cycle waits for its answers: wire, adapter and patience at 1 M baud."""
 _PATIENCE = "wait"
 _GO_HOME_S, _AT_HOME_MM, _TURN_RAD = 3.0, 0.5, 1.4
