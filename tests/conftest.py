@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import random
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
+from xdist.remote import Producer
+from xdist.scheduler import LoadScopeScheduling
 
 from tests import browser
+
+ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture(autouse=True)
@@ -40,18 +46,25 @@ def chromium() -> str:
     return path
 
 
-@pytest.hookimpl(tryfirst=True)  # xdist reads the marks in the same hook
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Keep together on one processor what shares a console or a file's fixtures."""
-    for item in items:
-        fixtures = getattr(item, "fixturenames", ())
-        place = item.nodeid.partition("::")[0]
-        shared = "console" in fixtures
-        if "browser_tests" in place:
-            place = "browser"
-        elif shared and place.startswith("tests/server/"):
-            place = "console"
-        item.add_marker(pytest.mark.xdist_group(place))
+class ByConsole(LoadScopeScheduling):  # type: ignore[misc] # xdist has no types
+    """Keeps together on one processor what shares a console or a file's fixtures."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file = nodeid.partition("::")[0]
+        if "browser_tests" in file:
+            return "browser"
+        return "console" if _shares_the_console(file) else file
+
+
+@functools.cache
+def _shares_the_console(file: str) -> bool:
+    return "tests.server.api_client" in (ROOT / file).read_text(encoding="utf-8")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByConsole:
+    """Lay out what runs side by side, where two processes run the tests."""
+    return ByConsole(config, log)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -42,7 +42,7 @@ def main(arguments: Sequence[str]) -> int:
         environment["KEYHOLE_CHROMIUM"] = chromium
     slowest = ["--durations=15"] if os.environ.get("CI") == "true" else []
     # More than two at once would take the processors away from the consoles under test.
-    parallel = [] if arguments else ["-n", "2", "--dist", "loadgroup"]
+    parallel = [] if arguments else ["-n", "2", "--no-loadscope-reorder"]
     command = [sys.executable, "-m", "pytest", *parallel, *slowest, *arguments]
     status = subprocess.run(command, cwd=ROOT, env=environment, check=False).returncode
     return status or bool(failed)
