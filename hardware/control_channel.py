@@ -26,6 +26,20 @@ class BadRequest(KeyholeError):
     code = "bad_request"
 
 
+class BadFault(KeyholeError):
+    """A fault was asked for in a way that makes no sense.
+
+    Attributes:
+        fault: what was asked for.
+    """
+
+    code = "bad_fault"
+
+    def __init__(self, fault: str, detail: str) -> None:
+        super().__init__(f"fault {fault!r}: {detail}")
+        self.fault = fault
+
+
 class ControlChannel:
     """Listens, and hands requests to whoever answers them.
 

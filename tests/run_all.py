@@ -20,7 +20,7 @@ from tests import browser  # noqa: E402 - the path above makes it importable
 CHECKS = {
     "ruff check": ["ruff", "check", "."],
     "ruff format": ["ruff", "format", "--check", "."],
-    "mypy": ["mypy"],
+    "mypy": ["mypy", "--num-workers", "2"],
 }
 
 

@@ -4,23 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from robot.errors import KeyholeError, UnknownName
+from hardware.control_channel import BadFault
+from robot.errors import UnknownName
 
-
-class BadFault(KeyholeError):
-    """A fault on the command line cannot be understood.
-
-    Attributes:
-        text: as it was given.
-    """
-
-    code = "bad_fault"
-
-    def __init__(self, text: str) -> None:
-        super().__init__(
-            f"{text!r} is no fault: give NAME, or NAME:after_ms=5000, or NAME:for_ms=200"
-        )
-        self.text = text
+_FORM = "give NAME, or NAME:after_ms=5000, or NAME:for_ms=200"
 
 
 class Fault(NamedTuple):
@@ -80,9 +67,9 @@ def wanted_faults(text: str) -> list[Wanted]:
             try:
                 numbers[key] = float(value)
             except ValueError as error:
-                raise BadFault(part) from error
+                raise BadFault(part, _FORM) from error
         if not numbers.keys() <= {"after_ms", "for_ms"} or min(numbers.values(), default=0) < 0:
-            raise BadFault(part)
+            raise BadFault(part, _FORM)
         found.append(Wanted(name, **numbers))
     return found
 

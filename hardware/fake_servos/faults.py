@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from robot.errors import KeyholeError, UnknownName
+from hardware.control_channel import BadFault
+from robot.errors import UnknownName
 
 
 class Kind(Enum):
@@ -57,20 +58,6 @@ KNOWN = {
     "reversed": Known(Kind.CONDITION, 0, "a servo turns the other way than it should"),
 }
 """Every fault by its name."""
-
-
-class BadFault(KeyholeError):
-    """A fault was asked for with options that make no sense.
-
-    Attributes:
-        fault: what was asked for.
-    """
-
-    code = "bad_fault"
-
-    def __init__(self, fault: str, detail: str) -> None:
-        super().__init__(f"fault {fault!r}: {detail}")
-        self.fault = fault
 
 
 @dataclass

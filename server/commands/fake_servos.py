@@ -89,7 +89,7 @@ def execute(arguments: argparse.Namespace) -> int:
 
 
 def _numbers(option: str, text: str, count: int) -> list[float]:
-    from hardware.fake_servos.faults import BadFault
+    from hardware.control_channel import BadFault
 
     try:
         values = [float(part) for part in text.split(",")]
@@ -101,7 +101,7 @@ def _numbers(option: str, text: str, count: int) -> list[float]:
 
 
 def _ids(text: str) -> tuple[int, ...]:
-    from hardware.fake_servos.faults import BadFault
+    from hardware.control_channel import BadFault
 
     first, dots, last = text.partition("..")
     try:

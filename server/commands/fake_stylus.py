@@ -80,8 +80,8 @@ def execute(arguments: argparse.Namespace) -> int:
         faults=arguments.faults,
         repeats_buttons=not arguments.on_change,
     )
-    print(f"fake stylus {where}, control channel at {options.control}", flush=True)
     with StopSignals() as signals:
+        print(f"fake stylus {where}, control channel at {options.control}", flush=True)
         serve(stylus, outlet, options, signals.received)
     return 0
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from robot.errors import KeyholeError, UnknownName
+from hardware.control_channel import BadFault
+from robot.errors import UnknownName
 
 
 @dataclass(frozen=True)
@@ -44,12 +45,6 @@ KNOWN = {
 _KEYS = ("times", "delay_ms", "value", "for_ms")
 _DEFAULT_DELAY_MS = {"drop-out": 1000.0, "late": 100.0}
 _TELEPORT_MM = 100.0
-
-
-class BadFault(KeyholeError):
-    """A fault was asked for in a way that makes no sense."""
-
-    code = "bad_fault"
 
 
 @dataclass
@@ -95,7 +90,7 @@ def make(name: str, options: dict[str, object], now_ns: int) -> Fault:
         except ValueError:
             number = -1.0
         if key not in _KEYS or not 0.0 <= number < 1e6:
-            raise BadFault(f"{name}: {key}={value} makes no sense; keys are {', '.join(_KEYS)}")
+            raise BadFault(name, f"{key}={value} makes no sense; keys are {', '.join(_KEYS)}")
         numbers[key] = number
     for_ms = numbers.get("for_ms", 0.0)
     return Fault(

@@ -60,7 +60,10 @@ class Memory:
     def look(self, supervisor: int) -> None:
         """Take one sample of the supervisor and its children."""
         listed = subprocess.run(
-            ["ps", "-A", "-o", "pid=,ppid=,rss=,args="], capture_output=True, text=True, check=False
+            ["ps", "-A", "-ww", "-o", "pid=,ppid=,rss=,args="],
+            capture_output=True,
+            text=True,
+            check=False,
         ).stdout
         for line in listed.splitlines():
             pid, parent, kilobytes, words = line.split(None, 3)

@@ -16,6 +16,7 @@ _PLUG = """() => {
   window.pad = { connected: true, axes: [0, 0, 0, 0], buttons };
   navigator.getGamepads = () => [null, window.pad];
 }"""
+_SEEN_MS = 500.0
 _UNPLUG = "() => { navigator.getGamepads = () => [null]; }"
 _HOLD = """([axes, held]) => {
   window.pad.axes = axes;
@@ -62,9 +63,12 @@ def test_a_gamepad_moves_the_tip_while_a_button_is_held(
 def test_a_gamepad_that_is_unplugged_while_it_leads_pauses(
     gamepad: ConsolePage, console: ConsoleProcess
 ) -> None:
-    hold(gamepad, held=True)
-
     def leads_or_stalled() -> bool:
+        # A press counts if the page has seen it begin: it looks once in every drawn picture.
+        hold(gamepad, held=False)
+        gamepad.page.wait_for_timeout(_SEEN_MS)
+        hold(gamepad, held=True)
+        gamepad.page.wait_for_timeout(_SEEN_MS)
         state = console.state()
         return bool(state["leader"] == "gamepad" or state["safety"]["state"] == "PAUSED")
 

@@ -29,6 +29,7 @@ BREAKAGES = {
     "wider than its button": ("#enable", "width: 30px"),
 }
 SIZES = [(1280, 800), (1920, 1080)]
+THEMES = ["light", "dark"]
 
 
 @pytest.mark.parametrize("query", ["", "?token=wrong"])
@@ -92,8 +93,9 @@ def sized(operator: ConsolePage) -> Iterator[Callable[[tuple[int, int], str], Pa
     resize((VIEWPORT["width"], VIEWPORT["height"]), "light")
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize(
+    ("size", "theme"), zip(SIZES, THEMES, strict=True), ids=("1280x800-light", "1920x1080-dark")
+)
 def test_nothing_overlaps_is_cut_or_pale(
     operator: ConsolePage,
     sized: Callable[[tuple[int, int], str], Page],

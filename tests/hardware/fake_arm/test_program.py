@@ -17,7 +17,8 @@ import pytest
 
 from hardware.arm.address import REAL_PORT
 from hardware.arm.reports import REAL
-from hardware.fake_arm.faults import FAULTS, BadFault, Wanted, wanted_faults
+from hardware.control_channel import BadFault
+from hardware.fake_arm.faults import FAULTS, Wanted, wanted_faults
 from hardware.fake_arm.program import FakeArm
 from robot.errors import UnknownName
 from tests.hardware.fake_arm.rig import START, address, controller

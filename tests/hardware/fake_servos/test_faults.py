@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from hardware.fake_servos.faults import KNOWN, BadFault, Faults, Kind, make, parse
+from hardware.control_channel import BadFault
+from hardware.fake_servos.faults import KNOWN, Faults, Kind, make, parse
 from hardware.servos.protocol import (
     BROADCAST,
     Instruction,

@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from hardware.control_channel import BadFault
 from robot.errors import KeyholeError
 from server.configuration_file import load
 from server.fake_stylus.device import FakeStylus, named_path, places_of
-from server.fake_stylus.faults import KNOWN, BadFault, Faults, make, parse
+from server.fake_stylus.faults import KNOWN, Faults, make, parse
 from tests.server.fake_stylus.conftest import line_places
 
 RATE = 500.0
