@@ -134,6 +134,8 @@ class StreamLeader:
 
     def _run(self) -> None:
         while not self._over.is_set():
+            # A lease that is taken anew meanwhile needs a connection that bears it.
+            lease = self.api.lease
             try:
                 with connect(
                     self.api.stream_address + "?rate_hz=1",
@@ -147,7 +149,7 @@ class StreamLeader:
                 ) as socket:
                     self._socket = socket
                     threading.Thread(target=self._read, args=(socket,), daemon=True).start()
-                    self._send(socket)
+                    self._send(socket, lease)
             except (OSError, TimeoutError, WebSocketException):
                 self._over.wait(_RETRY_S)
             finally:
@@ -161,10 +163,9 @@ class StreamLeader:
                     self.problems.append((time.monotonic_ns(), message["problem"]))
                     del self.problems[:-50]
 
-    def _send(self, socket: Connection) -> None:
+    def _send(self, socket: Connection, lease: str) -> None:
         due = time.monotonic()
         beat = renewed = 0.0
-        lease = self.api.lease
         while not self._over.is_set() and self.api.lease == lease:
             now = time.monotonic()
             if not self.quiet and now - beat > _HEARTBEAT_S:
