@@ -209,7 +209,7 @@ def test_holding_stops_under_torque_and_releasing_closes_the_brakes(rig: Rig) ->
     assert rig.stands()
     rig.arm.release()
     rig.until(lambda: not controller.enabled)
-    assert "brakes" in rig.message()
+    rig.until(lambda: "brakes" in rig.message())
     assert rig.stands()
     rig.arm.recover()
     rig.until_ready()
