@@ -52,7 +52,7 @@ class Rig:
     def message(self) -> str:
         return bytes(self.told()["message"]).decode()
 
-    def until(self, condition: Callable[[], bool], seconds: float = 20.0) -> None:
+    def until(self, condition: Callable[[], bool], seconds: float = 60.0) -> None:
         end = time.monotonic() + seconds
         while not condition():
             assert time.monotonic() < end, (self.reading(), self.message(), self.fake.state())
