@@ -225,7 +225,9 @@ def accept(listener: socket.socket, timeout_s: float) -> Connection | None:
                     protocol.send_response(protocol.accept(event))
             wire.sendall(b"".join(protocol.data_to_send()))
     except OSError:
-        pass
+        # It went in the middle of the handshake: there is nobody to tell.
+        wire.close()
+        return None
     if protocol.state is not State.OPEN:
         wire.close()
         return None
