@@ -43,35 +43,46 @@ def error_damping(distance: float, angle: float) -> float:
 class LexicographicProblem:
     """One plan's QP on memory that the caller fills.
 
+    Rows stand as rates are bounded: the n unknowns themselves (a box), then the limit rows that
+    couple them, then the plan's rows, level by level.
+
     Attributes:
         plan: the levels.
     """
 
     def __init__(
-        self, plan: Plan, matrix: np.ndarray, upper: np.ndarray, lower: np.ndarray
+        self,
+        plan: Plan,
+        matrix: np.ndarray,
+        upper: np.ndarray,
+        lower: np.ndarray,
+        limit_rows: int = 1,
     ) -> None:
         """Use the caller's memory.
 
         Args:
             plan: the levels, m rows in all.
-            matrix: (>= 1 + m, 10) the bend row, then the plan's rows.
-            upper: (>= 11 + m,) upper bounds: of the rates, of the bend row, of the plan's rows.
-            lower: (>= 11 + m,) lower bounds.
+            matrix: (>= limit_rows + m, n) the limit rows, then the plan's rows.
+            upper: (>= n + limit_rows + m,) upper bounds: of the rates, of the limit rows, of the
+                plan's rows.
+            lower: (>= n + limit_rows + m,) lower bounds.
+            limit_rows: how many rows beside the box stand above every level.
         """
-        count = len(plan.rows)
+        unknowns, count = matrix.shape[1], len(plan.rows)
+        limits = unknowns + limit_rows
         self.plan = plan
-        self._matrix = matrix[: 1 + count]
-        self._upper, self._lower = upper[: 11 + count], lower[: 11 + count]
-        self._hessian = np.eye(10)
-        self._linear = np.zeros(10)
-        self._sense = np.zeros(11 + count, dtype=np.int32)
-        self._break_points = np.array([11, *(11 + plan.starts[1:])], dtype=np.int32)
+        self._matrix = matrix[: limit_rows + count]
+        self._upper, self._lower = upper[: limits + count], lower[: limits + count]
+        self._hessian = np.eye(unknowns)
+        self._linear = np.zeros(unknowns)
+        self._sense = np.zeros(limits + count, dtype=np.int32)
+        self._break_points = np.array([limits, *(limits + plan.starts[1:])], dtype=np.int32)
 
     def solve(self, preferred: np.ndarray, damping: float) -> tuple[np.ndarray, int]:
-        """Rates (10,) and daqp's exit flag (positive: solved).
+        """Rates (n,) and daqp's exit flag (positive: solved).
 
         Args:
-            preferred: (10,) rates wanted where the levels leave freedom.
+            preferred: (n,) rates wanted where the levels leave freedom.
             damping: of every level, see :func:`error_damping`.
 
         Solved cold every time: a warm start gives rates that differ in the thirteenth digit, and a

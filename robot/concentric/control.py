@@ -1,0 +1,347 @@
+"""One iteration of the two arms' control: A to where it shall be, B keeping its place beside A.
+
+Paper 2 (Alsaka, Cinquin & Chikhaoui 2024), section 2: v_AB = λ_AB ε_AB, v_A = λ_A ε_A + ẋ_A, and a
+method that turns both into rates. Errors are desired minus actual. The experiments (T = 0.1 s) and
+the console (T = 0.01 s) run this same step. Nothing here raises once it is built.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+
+import numpy as np
+
+from robot.compiled import compiled
+from robot.concentric.design import Concentric
+from robot.concentric.kinematics import SOLVED
+from robot.concentric.methods.choice import Method, method_named
+from robot.concentric.methods.rate_problem import RateProblem, Solution
+from robot.concentric.pair import ArmPair, PairKinematics
+from robot.concentric.proximal import Proximal, settle_inside
+
+CORRECTIONS = 3
+"""How often a step that curvature bends away is linearised anew, for methods that do so."""
+SHARES = 5
+"""How many shares of such a step are tried, each half of the one before."""
+RELATIVE_CLOSE = 2e-6
+"""Relative error that a step may add without another correction, m."""
+RELATIVE_ALLOWED = 2e-5
+"""Relative error beyond which a step is halved, m."""
+_TOUCH = 1e-9
+
+
+class ControlStatus(IntEnum):
+    """What became of an iteration; nothing moves unless it is ``SOLVED``."""
+
+    SOLVED = 0
+    INFEASIBLE = 1
+    NOT_CONVERGED = 2
+    NOT_FINITE = 3
+    UNSTABLE = 4
+
+
+REASONS: dict[ControlStatus, str] = {
+    ControlStatus.SOLVED: "moved",
+    ControlStatus.INFEASIBLE: "no rates keep both the relative position and the limits",
+    ControlStatus.NOT_CONVERGED: "the tubes' torsion has no solution near by",
+    ControlStatus.NOT_FINITE: "a number is not finite",
+    ControlStatus.UNSTABLE: "the tubes are about to snap",
+}
+"""The status in words."""
+
+
+class ControlReport:
+    """What an iteration did; memory that :meth:`PairControl.step` fills.
+
+    Attributes:
+        status: see :class:`ControlStatus`.
+        rates: (4n,) of q_AB, m/s and rad/s.
+        relative_before: (3,) ε_AB before the step, m.
+        relative_after: (3,) and after it.
+        tracking_before: (3,) ε_A before the step, m.
+        tracking_after: (3,) and after it.
+        scales: (2,) task scales s_k; 1 where the method has none.
+        limits_active: bit i: translation i of [A, B] (2n of them) is as fast as it may go; bit
+            2n + i: an end or a neighbour holds it back; bit 4n + i: rotation i is at its cap.
+        bound_violation: largest violation of (1) with its margins after the step, m.
+        peak_rotation: fastest rotation of a tube, rad/s.
+        peak_translation: fastest translation, m/s.
+        corrections: how often the kinematics were evaluated again within the step.
+    """
+
+    def __init__(self, tubes: int) -> None:
+        self.status = ControlStatus.SOLVED
+        self.rates = np.zeros(4 * tubes)
+        self.relative_before, self.relative_after = np.zeros(3), np.zeros(3)
+        self.tracking_before, self.tracking_after = np.zeros(3), np.zeros(3)
+        self.scales = np.ones(2)
+        self.limits_active = 0
+        self.bound_violation = 0.0
+        self.peak_rotation = 0.0
+        self.peak_translation = 0.0
+        self.corrections = 0
+
+
+class PairControl:
+    """The control of both arms by one method, at one period.
+
+    Attributes:
+        pair: the model.
+        proximal: the limits of an arm's translations.
+        period: of an iteration, s.
+        method: name of the method.
+    """
+
+    def __init__(self, design: Concentric, period: float, method: str | None = None) -> None:
+        """Build it.
+
+        Args:
+            design: tubes, gains and limits.
+            period: of an iteration, s.
+            method: name of the method; None for the configuration's.
+
+        Raises:
+            UnknownName: no such method.
+            MeaninglessTubes: the model cannot describe the tubes, or they leave no room.
+        """
+        self.pair, self.proximal, self.period = ArmPair(design), Proximal(design), period
+        self._gains = design.relative_gain_per_s, design.tracking_gain_per_s
+        self._margin = design.limits.stability_margin
+        self._problem = RateProblem(self.proximal, design.limits.rotation_speed_rad_s, period)
+        self._method: Method = method_named(method or design.method, self._problem)
+        self._relative_target = np.zeros(3)
+        self._taken_back = min(design.relative_gain_per_s * period, 1.0)
+        self._asked = np.zeros(4 * self.pair.count)
+        self._guess = np.zeros(2 * self.pair.count)
+
+    @property
+    def method(self) -> str:
+        """Name of the method."""
+        return self._method.name
+
+    def step(
+        self,
+        now: PairKinematics,
+        desired: np.ndarray,
+        relative: np.ndarray,
+        feed_forward: np.ndarray,
+        after: PairKinematics,
+        report: ControlReport,
+    ) -> ControlStatus:
+        """One iteration.
+
+        Args:
+            now: where both arms stand, evaluated; not changed.
+            desired: (3,) where A's tip shall be, base frame, m.
+            relative: (3,) x_AB that shall be, m.
+            feed_forward: (3,) velocity of ``desired``, m/s.
+            after: filled: where both arms stand after the period; as ``now`` if nothing moves.
+            report: filled.
+        """
+        np.subtract(relative, now.relative, out=report.relative_before)
+        np.subtract(desired, now.position[0], out=report.tracking_before)
+        status = self._ask(now, feed_forward, report)
+        if status == ControlStatus.SOLVED:
+            status = self._move(now, relative, after, report)
+        if status != ControlStatus.SOLVED:
+            self._problem.rates[:] = 0.0
+            after.take(now)
+        self._conclude(now, desired, relative, after, report)
+        report.status = status
+        return status
+
+    def _ask(
+        self, now: PairKinematics, feed_forward: np.ndarray, report: ControlReport
+    ) -> ControlStatus:
+        """Rates by the method, from where the arms stand."""
+        problem, (relative_gain, tracking_gain) = self._problem, self._gains
+        np.multiply(report.relative_before, relative_gain, out=problem.relative_velocity)
+        np.multiply(report.tracking_before, tracking_gain, out=problem.tracking_velocity)
+        problem.tracking_velocity += feed_forward
+        problem.scales[:] = 1.0
+        problem.preferred[:] = 0.0
+        report.corrections = 0
+        if not (
+            _finite(problem.relative_velocity, problem.tracking_velocity)
+            and _finite(now.q, now.torsion)
+        ):
+            return ControlStatus.NOT_FINITE
+        problem.stand_at(now.q)
+        self._linearise(now)
+        self._relative_target[:] = now.relative + self.period * problem.relative_velocity
+        return self._solve()
+
+    def _linearise(self, at: PairKinematics) -> None:
+        self._problem.relative_jacobian[:] = at.relative_jacobian
+        self._problem.tracking_jacobian[:] = at.tracking_jacobian
+
+    def _solve(self) -> ControlStatus:
+        if self._method.solve(self._problem) != Solution.SOLVED:
+            return ControlStatus.INFEASIBLE
+        if not np.isfinite(self._problem.rates).all():
+            return ControlStatus.NOT_FINITE
+        return ControlStatus.SOLVED
+
+    def _move(
+        self,
+        now: PairKinematics,
+        relative: np.ndarray,
+        after: PairKinematics,
+        report: ControlReport,
+    ) -> ControlStatus:
+        """Integrate; refuse what does not converge or snaps."""
+        if self._method.corrects:
+            status = self._move_closely(now, relative, after, report)
+        else:
+            solved = self._try(now, after)
+            status = ControlStatus.SOLVED if solved else ControlStatus.NOT_CONVERGED
+        if status != ControlStatus.SOLVED:
+            return status
+        for arm in range(2):
+            if after.stability[arm] < min(self._margin, now.stability[arm]):
+                return ControlStatus.UNSTABLE
+        return ControlStatus.SOLVED
+
+    def _move_closely(
+        self,
+        now: PairKinematics,
+        relative: np.ndarray,
+        after: PairKinematics,
+        report: ControlReport,
+    ) -> ControlStatus:
+        """Integrate and take back what curvature adds to the relative error.
+
+        Where limits or a singular pose leave no way to take it back, a share of the step is made:
+        what curvature adds goes with the square of the share.
+        """
+        problem, share = self._problem, 1.0
+        self._asked[:] = problem.rates
+        before = math.sqrt(float(report.relative_before @ report.relative_before))
+        status = ControlStatus.NOT_CONVERGED
+        for _ in range(SHARES):
+            np.multiply(self._asked, share, out=problem.rates)
+            for correction in range(CORRECTIONS + 1):
+                report.corrections += 1
+                if not self._try(now, after):
+                    status = ControlStatus.NOT_CONVERGED
+                    break
+                status = ControlStatus.SOLVED
+                off = _distance(relative, after.relative)
+                if off <= max(RELATIVE_CLOSE, (1.0 - 0.5 * share * self._taken_back) * before):
+                    return status
+                if correction < CORRECTIONS and self._correct(now, after, share) != status:
+                    break
+            if status == ControlStatus.SOLVED and off <= max(RELATIVE_ALLOWED, before):
+                return status
+            share *= 0.5
+        return status
+
+    def _correct(self, now: PairKinematics, after: PairKinematics, share: float) -> ControlStatus:
+        """Rates near by, linearised at the end of the step, within the limits of its beginning."""
+        problem = self._problem
+        self._linearise(after)
+        np.matmul(after.tracking_jacobian, problem.rates, out=problem.tracking_velocity)
+        np.subtract(self._relative_target, now.relative, out=problem.relative_velocity)
+        problem.relative_velocity *= share
+        problem.relative_velocity += now.relative
+        problem.relative_velocity -= after.relative
+        problem.relative_velocity /= self.period
+        problem.relative_velocity += after.relative_jacobian @ problem.rates
+        problem.preferred[:] = problem.rates
+        return self._solve()
+
+    def _try(self, now: PairKinematics, after: PairKinematics) -> bool:
+        """Where the rates lead to; False where the kinematics do not converge."""
+        np.multiply(self._problem.rates, self.period, out=after.q)
+        after.q += now.q
+        if self._method.corrects:
+            self._settle(after.q)
+        self.pair.guess_after(now, after.q, self._guess)
+        return self.pair.evaluate(after, self._guess) == SOLVED
+
+    def _settle(self, q: np.ndarray) -> None:
+        n, limits = self.pair.count, self.proximal
+        for start in (0, 2 * n):
+            settle_inside(
+                q[start : start + n],
+                limits.lower,
+                limits.upper,
+                limits.gap_lower,
+                limits.gap_upper,
+            )
+
+    def _conclude(
+        self,
+        now: PairKinematics,
+        desired: np.ndarray,
+        relative: np.ndarray,
+        after: PairKinematics,
+        report: ControlReport,
+    ) -> None:
+        """What the report says beside the status."""
+        problem, n = self._problem, self.pair.count
+        report.rates[:] = problem.rates
+        report.scales[:] = problem.scales
+        np.subtract(relative, after.relative, out=report.relative_after)
+        np.subtract(desired, after.position[0], out=report.tracking_after)
+        report.bound_violation = max(
+            self.proximal.excess(after.q[start : start + n]) for start in (0, 2 * n)
+        )
+        report.peak_translation = float(np.abs(problem.rates[problem.translations]).max())
+        report.peak_rotation = float(np.abs(problem.rates[problem.rotations]).max())
+        report.limits_active = _limits_active(
+            problem.rates,
+            problem.box_lower,
+            problem.box_upper,
+            problem.gap_lower,
+            problem.gap_upper,
+            self.proximal.speed,
+            problem.rotation_speed,
+        )
+
+
+@compiled
+def _finite(first: np.ndarray, second: np.ndarray) -> bool:
+    return bool(np.isfinite(first).all() and np.isfinite(second).all())
+
+
+@compiled
+def _distance(first: np.ndarray, second: np.ndarray) -> float:
+    total = 0.0
+    for k in range(first.size):
+        total += (first[k] - second[k]) ** 2
+    return math.sqrt(total)
+
+
+@compiled
+def _limits_active(
+    rates: np.ndarray,
+    box_lower: np.ndarray,
+    box_upper: np.ndarray,
+    gap_lower: np.ndarray,
+    gap_upper: np.ndarray,
+    speed: float,
+    rotation_speed: float,
+) -> int:
+    """Bits of ``ControlReport.limits_active``."""
+    bits = 0
+    n = rates.size // 4
+    for arm in range(2):
+        for i in range(n):
+            place, bit = 2 * n * arm + i, n * arm + i
+            rate = rates[place]
+            if abs(rate) >= speed * (1.0 - _TOUCH):
+                bits |= 1 << bit
+            held = False
+            for outer in range(max(i, 1), min(i + 2, n)):
+                gap = (n - 1) * arm + outer - 1
+                opening = rates[2 * n * arm + outer] - rates[2 * n * arm + outer - 1]
+                slack = _TOUCH * speed
+                held = held or opening <= gap_lower[gap] + slack
+                held = held or opening >= gap_upper[gap] - slack
+            if held:
+                bits |= 1 << (2 * n + bit)
+            if abs(rates[place + n]) >= rotation_speed * (1.0 - _TOUCH):
+                bits |= 1 << (4 * n + bit)
+    return bits

@@ -1,0 +1,1 @@
+"""The methods that resolve the redundancy of two arms, one a module, behind one interface."""

@@ -1,0 +1,81 @@
+"""SNSQP: saturation in the null space as one quadratic program for each task, eq. (8).
+
+With 0 ≤ s_k ≤ 1, which the print leaves out: without it a task may run backward or too fast.
+"""
+
+from __future__ import annotations
+
+import daqp
+import numpy as np
+
+from robot.concentric.methods.rate_problem import RateProblem, Solution
+
+REGULARISATION = 0.1
+"""ζ, in SI units. Far below, the task is met at any speed that rotations can give."""
+_EQUALITY = 5
+_TOLERANCE = 1e-9
+
+
+class Snsqp:
+    """For task k: min ½ζ‖q̇‖² + (1 − s_k)²/ζ  with  J_k q̇ = s_k v_k, the tasks above kept, the box.
+
+    The unknowns are [q̇, s_k].
+    """
+
+    name = "snsqp"
+    corrects = False
+
+    def __init__(self, tubes: int) -> None:
+        count = 4 * tubes + 1
+        self._hessian = REGULARISATION * np.eye(count)
+        self._hessian[-1, -1] = 2.0 / REGULARISATION
+        self._linear = np.zeros(count)
+        self._linear[-1] = -2.0 / REGULARISATION
+        self._matrix = np.zeros((6, count))
+        self._upper, self._lower = np.zeros(count + 6), np.zeros(count + 6)
+        self._upper[count - 1] = 1.0
+        self._sense = np.zeros(count + 6, dtype=np.int32)
+        self._sense[count:] = _EQUALITY
+
+    def solve(self, problem: RateProblem) -> Solution:
+        """Fill the problem's rates and scales; zero where a program has no solution."""
+        count = len(problem.rates)
+        matrix, bounds = self._matrix, (self._lower, self._upper)
+        self._lower[:count], self._upper[:count] = problem.box_lower, problem.box_upper
+        matrix[:3, :count] = problem.relative_jacobian
+        matrix[3:, :count] = problem.tracking_jacobian
+        matrix[:3, count] = -problem.relative_velocity
+        for bound in bounds:
+            bound[count + 1 :] = 0.0
+        first = self._solve(3)
+        if first is None:
+            return self._give_up(problem)
+        matrix[:3, count] = 0.0
+        matrix[3:, count] = -problem.tracking_velocity
+        for bound in bounds:
+            bound[count + 1 : count + 4] = problem.relative_jacobian @ first[:count]
+        second = self._solve(6)
+        if second is None:
+            return self._give_up(problem)
+        problem.rates[:] = second[:count]
+        problem.scales[:] = first[count], second[count]
+        return Solution.SOLVED
+
+    def _solve(self, rows: int) -> np.ndarray | None:
+        size = len(self._linear) + rows
+        found, _, flag, _ = daqp.solve(
+            self._hessian,
+            self._linear,
+            self._matrix[:rows],
+            self._upper[:size],
+            self._lower[:size],
+            self._sense[:size],
+            primal_tol=_TOLERANCE,
+        )
+        return np.asarray(found) if flag > 0 else None
+
+    @staticmethod
+    def _give_up(problem: RateProblem) -> Solution:
+        problem.rates[:] = 0.0
+        problem.scales[:] = 0.0
+        return Solution.INFEASIBLE
