@@ -13,8 +13,8 @@ import math
 import numpy as np
 
 from robot.compiled import compiled
-from robot.concentric.helix import cross
 from robot.concentric.state import ArmState
+from robot.concentric.vectors import add_to_column, column, combine, cross
 
 POINTS = 4
 
@@ -63,9 +63,7 @@ def _angles_at_points(state: ArmState, step: float) -> tuple[np.ndarray, ...]:
     count = len(state.angle)
     cosines, sines = np.zeros((POINTS, count)), np.zeros((POINTS, count))
     bend, pull = np.empty((POINTS, 2)), np.zeros((POINTS, count))
-    pull_before = np.empty((POINTS, count))
     for _ in range(_MOST_ITERATIONS):
-        pull_before[:] = pull
         worst = 0.0
         for point in range(POINTS):
             x = y = 0.0
@@ -81,11 +79,9 @@ def _angles_at_points(state: ArmState, step: float) -> tuple[np.ndarray, ...]:
                 y += state.share[index] * sines[point, index]
             bend[point, 0], bend[point, 1] = x, y
             for index in range(count):
-                pull[point, index] = state.gain[index] * (
-                    sines[point, index] * x - cosines[point, index] * y
-                )
-                change = abs(pull[point, index] - pull_before[point, index])
-                worst = max(worst, step * step * change)
+                value = state.gain[index] * (sines[point, index] * x - cosines[point, index] * y)
+                worst = max(worst, step * step * abs(value - pull[point, index]))
+                pull[point, index] = value
         if worst < _SETTLED:
             break
     return cosines, sines, bend, pull
@@ -96,7 +92,10 @@ def _frames_at_points(rotation: np.ndarray, bend: np.ndarray, step: float) -> np
     """(m + 1, 3, 3) Bishop frames at the points of a step and at its end."""
     frames = np.empty((POINTS + 1, 3, 3))
     slopes = np.empty((POINTS, 3, 3))
-    frames[:] = rotation
+    for point in range(POINTS + 1):
+        for row in range(3):
+            for axis in range(3):
+                frames[point, row, axis] = rotation[row, axis]
     for _ in range(_MOST_ITERATIONS):
         for point in range(POINTS):
             x, y = bend[point, 0], bend[point, 1]
@@ -107,15 +106,15 @@ def _frames_at_points(rotation: np.ndarray, bend: np.ndarray, step: float) -> np
         worst = 0.0
         for point in range(POINTS + 1):
             for row in range(3):
-                for column in range(3):
-                    value = rotation[row, column]
+                for axis in range(3):
+                    value = rotation[row, axis]
                     for other in range(POINTS):
                         weight = _WEIGHTS[other]
                         if point < POINTS:
                             weight = _INTEGRALS[point, other]
-                        value += step * weight * slopes[other, row, column]
-                    worst = max(worst, abs(value - frames[point, row, column]))
-                    frames[point, row, column] = value
+                        value += step * weight * slopes[other, row, axis]
+                    worst = max(worst, abs(value - frames[point, row, axis]))
+                    frames[point, row, axis] = value
         if worst < _SETTLED:
             break
     return frames
@@ -125,7 +124,7 @@ def _frames_at_points(rotation: np.ndarray, bend: np.ndarray, step: float) -> np
 def _changes_at_points(
     state: ArmState,
     step: float,
-    column: int,
+    parameter: int,
     points: tuple[np.ndarray, ...],
     angles: np.ndarray,
     pulls: np.ndarray,
@@ -135,14 +134,14 @@ def _changes_at_points(
     Args:
         state: at the beginning of the step.
         step: m.
-        column: of the parameter.
+        parameter: its column.
         points: what :func:`_angles_at_points` found.
         angles: (m, n) filled.
         pulls: (m, n) filled; zero where no tube is curved.
     """
     cosines, sines, bend, _ = points
     count = len(state.angle)
-    pulls[:] = 0.0
+    pulls.fill(0.0)
     for _ in range(_MOST_ITERATIONS):
         worst = size = 0.0
         for point in range(POINTS):
@@ -151,8 +150,8 @@ def _changes_at_points(
                 if state.share[index] == 0.0:
                     continue
                 change = (
-                    state.angle_change[index, column]
-                    + _PLACES[point] * step * state.rate_change[index, column]
+                    state.angle_change[index, parameter]
+                    + _PLACES[point] * step * state.rate_change[index, parameter]
                 )
                 for other in range(POINTS):
                     change += step * step * _TWICE[point, other] * pulls[other, index]
@@ -179,7 +178,7 @@ def _changes_at_points(
 def _turn_by_bending(
     state: ArmState,
     step: float,
-    column: int,
+    parameter: int,
     points: tuple[np.ndarray, ...],
     angles: np.ndarray,
     frames: np.ndarray,
@@ -192,11 +191,10 @@ def _turn_by_bending(
             x -= state.share[index] * points[1][point, index] * angles[point, index]
             y += state.share[index] * points[0][point, index] * angles[point, index]
         frame = frames[point]
-        turn = step * _WEIGHTS[point] * (x * frame[:, 0] + y * frame[:, 1])
-        moment = cross(positions[point], turn)
-        for row in range(3):
-            state.turn[row, column] += turn[row]
-            state.moment[row, column] += moment[row]
+        place = (positions[point, 0], positions[point, 1], positions[point, 2])
+        turn = combine(x, column(frame, 0), y, column(frame, 1))
+        add_to_column(state.turn, parameter, step * _WEIGHTS[point], turn)
+        add_to_column(state.moment, parameter, step * _WEIGHTS[point], cross(place, turn))
 
 
 @compiled
@@ -222,24 +220,27 @@ def _advance_step(state: ArmState, step: float, first: int, with_shape: bool) ->
     else:
         frames, positions = np.empty((0, 3, 3)), np.empty((0, 3))
     angles, pulls = np.zeros((POINTS, count)), np.zeros((POINTS, count))
-    for column in range(first, 3 * count):
-        _changes_at_points(state, step, column, points, angles, pulls)
+    for parameter in range(first, 3 * count):
+        _changes_at_points(state, step, parameter, points, angles, pulls)
         if with_shape:
-            _turn_by_bending(state, step, column, points, angles, frames, positions)
+            _turn_by_bending(state, step, parameter, points, angles, frames, positions)
         for index in range(count):
-            state.angle_change[index, column] += step * state.rate_change[index, column]
+            state.angle_change[index, parameter] += step * state.rate_change[index, parameter]
             for point in range(POINTS):
                 pull = pulls[point, index]
-                state.angle_change[index, column] += step * step * _WEIGHTS_TWICE[point] * pull
-                state.rate_change[index, column] += step * _WEIGHTS[point] * pull
+                state.angle_change[index, parameter] += step * step * _WEIGHTS_TWICE[point] * pull
+                state.rate_change[index, parameter] += step * _WEIGHTS[point] * pull
     for index in range(count):
         state.angle[index] += step * state.rate[index]
         for point in range(POINTS):
             state.angle[index] += step * step * _WEIGHTS_TWICE[point] * points[3][point, index]
             state.rate[index] += step * _WEIGHTS[point] * points[3][point, index]
-    if with_shape:
-        state.position[:] = positions[POINTS]
-        state.rotation[:] = frames[POINTS]
+    if not with_shape:
+        return
+    for row in range(3):
+        state.position[row] = positions[POINTS, row]
+        for axis in range(3):
+            state.rotation[row, axis] = frames[POINTS, row, axis]
 
 
 @compiled

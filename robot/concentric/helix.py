@@ -13,6 +13,7 @@ import numpy as np
 
 from robot.compiled import compiled
 from robot.concentric.state import ArmState
+from robot.concentric.vectors import Triple, add_to_column, column, combine, cross
 
 SERIES = 0.1
 """Below this turn (rad) the coefficients come from their Taylor series; at it, the neglected terms
@@ -44,38 +45,51 @@ def _coefficients(turn: float) -> tuple[float, float, float, float, float]:
 
 
 @compiled
-def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross product a × b of two (3,) vectors."""
-    return np.array(
-        (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-    )
-
-
-@compiled
 def _twist_on(state: ArmState, length: float, first: int) -> None:
     """Every tube's angle goes on at its own rate over ``length`` (m)."""
     for index in range(len(state.angle)):
         state.angle[index] += length * state.rate[index]
-        for column in range(first, state.turn.shape[1]):
-            state.angle_change[index, column] += length * state.rate_change[index, column]
+        for parameter in range(first, state.turn.shape[1]):
+            change = length * state.rate_change[index, parameter]
+            state.angle_change[index, parameter] += change
 
 
 @compiled
-def _rotate(rotation: np.ndarray, bend: np.ndarray, length: float, own: float) -> None:
+def _rotate(rotation: np.ndarray, bend: Triple, length: float, own: float) -> None:
     """Turn ``rotation`` by exp(length [bend]) from the left and by −``own`` about its own z."""
-    whole = length * math.sqrt(bend[0] ** 2 + bend[1] ** 2 + bend[2] ** 2)
-    sinc, versine, _, _, _ = _coefficients(whole)
-    vector = length * bend
-    for column in range(3):
-        axis = rotation[:, column].copy()
-        once = cross(vector, axis)
-        twice = cross(vector, once)
-        for row in range(3):
-            rotation[row, column] = axis[row] + sinc * once[row] + versine * twice[row]
+    sinc, versine, _, _, _ = _coefficients(length * math.sqrt(_square(bend)))
+    for index in range(3):
+        once = cross(bend, column(rotation, index))
+        twice = cross(bend, once)
+        add_to_column(rotation, index, length * sinc, once)
+        add_to_column(rotation, index, length * length * versine, twice)
     cosine, sine = math.cos(own), math.sin(own)
     for row in range(3):
         x, y = rotation[row, 0], rotation[row, 1]
         rotation[row, 0], rotation[row, 1] = cosine * x - sine * y, sine * x + cosine * y
+
+
+@compiled
+def _square(vector: Triple) -> float:
+    return vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]
+
+
+@compiled
+def _chord_and_area(bend: Triple, tangent: Triple, length: float) -> tuple[Triple, Triple]:
+    """Of a helix that starts at the origin: ∫ t ds (m) and ∫ p × t ds (m²).
+
+    The second from the parts of t along the helix's axis and beside it.
+    """
+    square = _square(bend)
+    rate = bend[0] * tangent[0] + bend[1] * tangent[1] + bend[2] * tangent[2]
+    _, versine, cubic, fourth, fifth = _coefficients(length * math.sqrt(square))
+    once = cross(bend, tangent)
+    twice = cross(bend, once)
+    swing = combine(versine, once, length * cubic, twice)
+    chord = combine(length, tangent, length * length, swing)
+    cube = length**3 / square
+    along = combine(cube * _square(once) * cubic, bend, -cube * rate * fourth, twice)
+    return chord, combine(1.0, along, length**4 * rate * fifth, once)
 
 
 @compiled
@@ -92,38 +106,30 @@ def advance_helix(state: ArmState, length: float, first: int, with_shape: bool) 
     for index in range(len(state.share)):
         if state.share[index] != 0.0:
             curved = index
-    if not with_shape or curved < 0:
-        if with_shape:
-            state.position[:] += length * state.rotation[:, 2]
+    tangent = column(state.rotation, 2)
+    if not with_shape:
         _twist_on(state, length, first)
         return
-    start, tangent = state.position.copy(), state.rotation[:, 2].copy()
-    kappa, rate, angle = state.share[curved], state.rate[curved], state.angle[curved]
-    x_axis = math.cos(angle) * state.rotation[:, 0] + math.sin(angle) * state.rotation[:, 1]
-    bend = kappa * x_axis + rate * tangent
-    square = kappa * kappa + rate * rate
-    _, versine, cubic, fourth, fifth = _coefficients(length * math.sqrt(square))
-    once = cross(bend, tangent)
-    twice = cross(bend, once)
-    chord = length * (tangent + length * (versine * once + length * cubic * twice))
-    # ∫ (p − start) × t ds, from t's parts along the axis of the helix and beside it.
-    area = (
-        length**3
-        / square
-        * (
-            kappa * kappa * cubic * bend
-            - rate * fourth * twice
-            + rate * length * square * fifth * once
-        )
-    )
-    moment = cross(start, chord) + area
-    _carry_turn(state, curved, 1.0, first)
-    for column in range(first, state.turn.shape[1]):
-        change = state.rate_change[curved, column]
+    if curved < 0:
+        _twist_on(state, length, first)
         for row in range(3):
-            state.turn[row, column] += chord[row] * change
-            state.moment[row, column] += moment[row] * change
-    state.position[:] += chord
+            state.position[row] += length * tangent[row]
+        return
+    kappa, rate, angle = state.share[curved], state.rate[curved], state.angle[curved]
+    normal = combine(
+        math.cos(angle), column(state.rotation, 0), math.sin(angle), column(state.rotation, 1)
+    )
+    bend = combine(kappa, normal, rate, tangent)
+    chord, area = _chord_and_area(bend, tangent, length)
+    start = (state.position[0], state.position[1], state.position[2])
+    moment = combine(1.0, cross(start, chord), 1.0, area)
+    _carry_turn(state, curved, 1.0, first)
+    for parameter in range(first, state.turn.shape[1]):
+        change = state.rate_change[curved, parameter]
+        add_to_column(state.turn, parameter, change, chord)
+        add_to_column(state.moment, parameter, change, moment)
+    for row in range(3):
+        state.position[row] += chord[row]
     _rotate(state.rotation, bend, length, rate * length)
     _twist_on(state, length, first)
     _carry_turn(state, curved, -1.0, first)
@@ -132,10 +138,9 @@ def advance_helix(state: ArmState, length: float, first: int, with_shape: bool) 
 @compiled
 def _carry_turn(state: ArmState, curved: int, sign: float, first: int) -> None:
     """From the Bishop frame's turn to that of the tube ``curved`` (sign 1), or back (sign −1)."""
-    tangent = sign * state.rotation[:, 2]
-    moment = cross(state.position, tangent)
-    for column in range(first, state.turn.shape[1]):
-        change = state.angle_change[curved, column]
-        for row in range(3):
-            state.turn[row, column] += tangent[row] * change
-            state.moment[row, column] += moment[row] * change
+    tangent = column(state.rotation, 2)
+    moment = cross((state.position[0], state.position[1], state.position[2]), tangent)
+    for parameter in range(first, state.turn.shape[1]):
+        change = sign * state.angle_change[curved, parameter]
+        add_to_column(state.turn, parameter, change, tangent)
+        add_to_column(state.moment, parameter, change, moment)

@@ -17,10 +17,10 @@ import math
 import numpy as np
 
 from robot.compiled import compiled
-from robot.concentric.helix import cross
 from robot.concentric.sections import walk
 from robot.concentric.state import ArmState, state_at_exit
 from robot.concentric.tubes import ROUNDING
+from robot.concentric.vectors import column, combine, cross
 
 SOLVED = 0
 NOT_CONVERGED = 1
@@ -34,40 +34,60 @@ TOLERANCE = 1e-10
 
 _MOST_STEPS = 30
 _MOST_HALVINGS = 8
+_FINEST_COUPLING = 1e-4
 
 
 @compiled
-def eliminate(matrix: np.ndarray, right: np.ndarray) -> float:
+def _swap_rows(matrix: np.ndarray, first: int, second: int) -> None:
+    for entry in range(matrix.shape[1]):
+        held = matrix[first, entry]
+        matrix[first, entry] = matrix[second, entry]
+        matrix[second, entry] = held
+
+
+@compiled
+def _eliminate(matrix: np.ndarray, right: np.ndarray) -> float:
     """Determinant of ``matrix`` (n, n); ``right`` (n, m) becomes the solution, unless it is 0.
 
     ``matrix`` is overwritten (Gaussian elimination with partial pivoting).
     """
     count = len(matrix)
     determinant = 1.0
-    for column in range(count):
-        pivot = column
-        for row in range(column + 1, count):
-            if abs(matrix[row, column]) > abs(matrix[pivot, column]):
-                pivot = row
-        if matrix[pivot, column] == 0.0:
+    for pivot in range(count):
+        best = pivot
+        for row in range(pivot + 1, count):
+            if abs(matrix[row, pivot]) > abs(matrix[best, pivot]):
+                best = row
+        if matrix[best, pivot] == 0.0:
             return 0.0
-        if pivot != column:
+        if best != pivot:
             determinant = -determinant
-            for other in range(count):
-                swapped = matrix[column, other]
-                matrix[column, other], matrix[pivot, other] = matrix[pivot, other], swapped
-            for other in range(right.shape[1]):
-                swapped = right[column, other]
-                right[column, other], right[pivot, other] = right[pivot, other], swapped
-        determinant *= matrix[column, column]
+            _swap_rows(matrix, pivot, best)
+            _swap_rows(right, pivot, best)
+        determinant *= matrix[pivot, pivot]
         for row in range(count):
-            if row != column:
-                factor = matrix[row, column] / matrix[column, column]
-                matrix[row, :] -= factor * matrix[column, :]
-                right[row, :] -= factor * right[column, :]
+            if row == pivot:
+                continue
+            factor = matrix[row, pivot] / matrix[pivot, pivot]
+            for entry in range(pivot, count):
+                matrix[row, entry] -= factor * matrix[pivot, entry]
+            for entry in range(right.shape[1]):
+                right[row, entry] -= factor * right[pivot, entry]
     for row in range(count):
-        right[row, :] /= matrix[row, row]
+        for entry in range(right.shape[1]):
+            right[row, entry] /= matrix[row, row]
     return determinant
+
+
+@compiled
+def _by_torsion(changes: np.ndarray) -> np.ndarray:
+    """Copy (n, n) of the columns of ``changes`` (n, 3n) that are derivatives by the torsion."""
+    count = len(changes)
+    copy = np.empty((count, count))
+    for row in range(count):
+        for entry in range(count):
+            copy[row, entry] = changes[row, 2 * count + entry]
+    return copy
 
 
 @compiled
@@ -120,12 +140,14 @@ def solve_torsion(q: np.ndarray, tubes: np.ndarray, coupling: float, torsion: np
     for _ in range(_MOST_STEPS):
         if size < TOLERANCE:
             return SOLVED
-        step[:, 0] = residual
-        if eliminate(residual_change[:, 2 * count :].copy(), step) == 0.0:
+        for index in range(count):
+            step[index, 0] = residual[index]
+        if _eliminate(_by_torsion(residual_change), step) == 0.0:
             return SINGULAR
         share = 1.0
         for halving in range(_MOST_HALVINGS + 1):
-            trial[:] = torsion - share * step[:, 0]
+            for index in range(count):
+                trial[index] = torsion[index] - share * step[index, 0]
             state = state_at_exit(q, trial)
             walk(state, q, tubes, coupling, 2 * count, False, residual, residual_change)
             if _largest(residual) < size or halving == _MOST_HALVINGS:
@@ -134,27 +156,73 @@ def solve_torsion(q: np.ndarray, tubes: np.ndarray, coupling: float, torsion: np
         if not _largest(residual) < size:
             return NOT_CONVERGED
         size = _largest(residual)
-        torsion[:] = trial
+        for index in range(count):
+            torsion[index] = trial[index]
     return NOT_CONVERGED
 
 
 @compiled
-def _tip(
-    state: ArmState, q: np.ndarray, position: np.ndarray, rotation: np.ndarray, columns: np.ndarray
-) -> None:
+def solve_cold(q: np.ndarray, tubes: np.ndarray, torsion: np.ndarray) -> int:
+    """Find the torsion of tubes that nothing is known about, by letting them couple gradually.
+
+    Without coupling no tube is twisted, which is stable. The coupling grows in steps that keep the
+    stability determinant above zero, so that the solution found is stable as well, and it is the
+    one without a turn more than the rotations give.
+
+    Args:
+        q: (2n,) translations in m, rotations in rad.
+        tubes: (n,) ``TUBE``.
+        torsion: (n,) filled with torsion rates at the exit, rad/m: the guess for ``solve_arm``.
+
+    Returns:
+        ``SOLVED``; ``OUTSIDE``; ``SINGULAR`` where the tubes snap before they are fully coupled.
+    """
+    torsion.fill(0.0)
+    if _is_outside(q, tubes):
+        return OUTSIDE
+    count = len(tubes)
+    trial, residual, residual_change = torsion.copy(), np.empty(count), np.empty((count, 3 * count))
+    coupling, step = 0.0, 0.25
+    while coupling < 1.0:
+        ahead = min(coupling + step, 1.0)
+        trial[:] = torsion
+        solved = solve_torsion(q, tubes, ahead, trial) == SOLVED
+        if solved:
+            state = state_at_exit(q, trial)
+            walk(state, q, tubes, ahead, 2 * count, False, residual, residual_change)
+            solved = _eliminate(_by_torsion(residual_change), np.empty((count, 0))) > 0.0
+        if solved:
+            coupling = ahead
+            torsion[:] = trial
+        else:
+            step *= 0.5
+            if step < _FINEST_COUPLING:
+                return SINGULAR
+    return SOLVED
+
+
+@compiled
+def _tip(state: ArmState, position: np.ndarray, rotation: np.ndarray, columns: np.ndarray) -> None:
     """Pose and its derivatives (6, 3n) from the Bishop frame's at the tip."""
-    tangent = state.rotation[:, 2]
+    tangent = column(state.rotation, 2)
+    here = (state.position[0], state.position[1], state.position[2])
     cosine, sine = math.cos(state.angle[0]), math.sin(state.angle[0])
-    position[:] = state.position
-    rotation[:, 0] = cosine * state.rotation[:, 0] + sine * state.rotation[:, 1]
-    rotation[:, 1] = cosine * state.rotation[:, 1] - sine * state.rotation[:, 0]
-    rotation[:, 2] = tangent
-    for column in range(columns.shape[1]):
-        linear = cross(state.turn[:, column], state.position)
+    x_axis = combine(cosine, column(state.rotation, 0), sine, column(state.rotation, 1))
+    y_axis = cross(tangent, x_axis)
+    for row in range(3):
+        position[row] = here[row]
+        rotation[row, 0], rotation[row, 1], rotation[row, 2] = (
+            x_axis[row],
+            y_axis[row],
+            tangent[row],
+        )
+    for parameter in range(columns.shape[1]):
+        turn = column(state.turn, parameter)
+        linear = cross(turn, here)
+        change = state.angle_change[0, parameter]
         for row in range(3):
-            columns[row, column] = linear[row] + state.moment[row, column]
-            turn = tangent[row] * state.angle_change[0, column]
-            columns[3 + row, column] = state.turn[row, column] + turn
+            columns[row, parameter] = linear[row] + state.moment[row, parameter]
+            columns[3 + row, parameter] = turn[row] + tangent[row] * change
     for row in range(3):
         columns[row, 0] += tangent[row]
         columns[3 + row, 0] += tangent[row] * state.rate[0]
@@ -192,24 +260,39 @@ def solve_arm(
         ``SOLVED``, or why not; everything is NaN then.
     """
     count = len(tubes)
-    position[:], rotation[:], jacobian[:], torsion_change[:] = np.nan, np.nan, np.nan, np.nan
-    stability[0] = np.nan
-    torsion[:] = guess
-    status = OUTSIDE
-    if not _is_outside(q, tubes):
-        status = solve_torsion(q, tubes, 1.0, torsion)
+    solution = guess.copy()
+    for out in (position, torsion, stability):
+        out.fill(np.nan)
+    for out in (rotation, jacobian, torsion_change):
+        out.fill(np.nan)
+    if _is_outside(q, tubes):
+        return OUTSIDE
+    status = solve_torsion(q, tubes, 1.0, solution)
     if status != SOLVED:
-        torsion[:] = np.nan
         return status
     residual, residual_change = np.empty(count), np.empty((count, 3 * count))
     columns = np.empty((6, 3 * count))
-    state = state_at_exit(q, torsion)
-    walk(state, q, tubes, 1.0, 0, True, residual, residual_change)
-    _tip(state, q, position, rotation, columns)
-    torsion_change[:] = -residual_change[:, : 2 * count]
-    stability[0] = eliminate(residual_change[:, 2 * count :].copy(), torsion_change)
-    if stability[0] == 0.0:
+    state = state_at_exit(q, solution)
+    # An integer that is no literal shares its compiled walk with the drawing of backbones.
+    walk(state, q, tubes, 1.0, np.int64(0), True, residual, residual_change)
+    change = np.empty((count, 2 * count))
+    for row in range(count):
+        for parameter in range(2 * count):
+            change[row, parameter] = -residual_change[row, parameter]
+    determinant = _eliminate(_by_torsion(residual_change), change)
+    if determinant == 0.0:
         return SINGULAR
-    by_torsion = np.ascontiguousarray(columns[:, 2 * count :])
-    jacobian[:] = columns[:, : 2 * count] + by_torsion @ torsion_change
+    _tip(state, position, rotation, columns)
+    stability[0] = determinant
+    for index in range(count):
+        torsion[index] = solution[index]
+        for parameter in range(2 * count):
+            torsion_change[index, parameter] = change[index, parameter]
+    for row in range(6):
+        for parameter in range(2 * count):
+            jacobian[row, parameter] = columns[row, parameter]
+            for index in range(count):
+                jacobian[row, parameter] += (
+                    columns[row, 2 * count + index] * change[index, parameter]
+                )
     return SOLVED

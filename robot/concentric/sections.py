@@ -13,8 +13,9 @@ import numpy as np
 
 from robot.compiled import compiled
 from robot.concentric.collocation import advance_overlap
-from robot.concentric.helix import advance_helix, cross
+from robot.concentric.helix import advance_helix
 from robot.concentric.state import ArmState, curvature, share_out, twisting
+from robot.concentric.vectors import add_to_column, column, combine, cross
 
 
 @compiled
@@ -91,10 +92,10 @@ def pass_place(
         state.rate_change[tube, index] -= twisting(state, tube, behind)
     if with_shape:
         x, y = before[0] - behind[0], before[1] - behind[1]
-        turn = x * state.rotation[:, 0] + y * state.rotation[:, 1]
-        moment = cross(state.position, turn)
-        state.turn[:, index] += turn
-        state.moment[:, index] += moment
+        turn = combine(x, column(state.rotation, 0), y, column(state.rotation, 1))
+        position = (state.position[0], state.position[1], state.position[2])
+        add_to_column(state.turn, index, 1.0, turn)
+        add_to_column(state.moment, index, 1.0, cross(position, turn))
 
 
 @compiled
@@ -131,7 +132,8 @@ def walk(
         moves = here > 0.0
         if which[place] >= count:
             residual[index] = state.rate[index]
-            residual_change[index, :] = state.rate_change[index, :]
+            for parameter in range(3 * count):
+                residual_change[index, parameter] = state.rate_change[index, parameter]
             if moves:
                 residual_change[index, index] += twisting(state, index, curvature(state))
         pass_place(state, which[place], moves, tubes, coupling, with_shape)

@@ -69,11 +69,11 @@ def state_at_exit(q: np.ndarray, torsion: np.ndarray) -> ArmState:
     count = len(torsion)
     state = ArmState(
         np.empty(count),
-        torsion.copy(),
+        np.empty(count),
         np.zeros((count, 3 * count)),
         np.zeros((count, 3 * count)),
         np.zeros(3),
-        np.eye(3),
+        np.zeros((3, 3)),
         np.zeros((3, 3 * count)),
         np.zeros((3, 3 * count)),
         np.zeros(count),
@@ -81,7 +81,10 @@ def state_at_exit(q: np.ndarray, torsion: np.ndarray) -> ArmState:
         np.ones(count),
         np.zeros(count),
     )
+    for row in range(3):
+        state.rotation[row, row] = 1.0
     for index in range(count):
+        state.rate[index] = torsion[index]
         state.angle[index] = q[count + index] - q[index] * torsion[index]
         state.angle_change[index, index] = -torsion[index]
         state.angle_change[index, count + index] = 1.0
