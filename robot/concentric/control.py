@@ -39,6 +39,7 @@ class ControlStatus(IntEnum):
     NOT_CONVERGED = 2
     NOT_FINITE = 3
     UNSTABLE = 4
+    SOLVER_FAILED = 5
 
 
 REASONS: dict[ControlStatus, str] = {
@@ -47,6 +48,7 @@ REASONS: dict[ControlStatus, str] = {
     ControlStatus.NOT_CONVERGED: "the tubes' torsion has no solution near by",
     ControlStatus.NOT_FINITE: "a number is not finite",
     ControlStatus.UNSTABLE: "the tubes are about to snap",
+    ControlStatus.SOLVER_FAILED: "the solver goes in circles",
 }
 """The status in words."""
 
@@ -177,8 +179,11 @@ class PairControl:
         self._problem.tracking_jacobian[:] = at.tracking_jacobian
 
     def _solve(self) -> ControlStatus:
-        if self._method.solve(self._problem) != Solution.SOLVED:
+        solution = self._method.solve(self._problem)
+        if solution == Solution.INFEASIBLE:
             return ControlStatus.INFEASIBLE
+        if solution != Solution.SOLVED:
+            return ControlStatus.SOLVER_FAILED
         if not np.isfinite(self._problem.rates).all():
             return ControlStatus.NOT_FINITE
         return ControlStatus.SOLVED

@@ -93,7 +93,7 @@ class Hqp:
         shares, flag = self._solver.solve(self._preferred, problem.damping)
         if flag <= 0:
             problem.rates[:] = 0.0
-            return Solution.INFEASIBLE
+            return Solution.FAILED
         np.clip(shares, lower[:count], upper[:count], out=problem.rates)  # the tolerance
         problem.rates *= self._unit
         return Solution.SOLVED

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import daqp
 import numpy as np
 
+from robot.concentric.methods.quadratic_program import EQUALITY, solve_program
 from robot.concentric.methods.rate_problem import RateProblem, Solution
 
 REGULARISATION = 1e-6
 """ζ, in SI units."""
-_EQUALITY = 5
-_TOLERANCE = 1e-9
 
 
 class Nspqp:
@@ -22,7 +20,7 @@ class Nspqp:
     def __init__(self, tubes: int) -> None:
         unknowns = 4 * tubes
         self._sense = np.zeros(unknowns + 3, dtype=np.int32)
-        self._sense[unknowns:] = _EQUALITY
+        self._sense[unknowns:] = EQUALITY
         self._upper, self._lower = np.zeros(unknowns + 3), np.zeros(unknowns + 3)
         self._hessian = np.zeros((unknowns, unknowns))
         self._linear = np.zeros(unknowns)
@@ -37,17 +35,13 @@ class Nspqp:
         np.negative(self._linear, out=self._linear)
         self._lower[:count], self._upper[:count] = problem.box_lower, problem.box_upper
         self._lower[count:] = self._upper[count:] = problem.relative_velocity
-        rates, _, flag, _ = daqp.solve(
+        rates, solution = solve_program(
             self._hessian,
             self._linear,
             problem.relative_jacobian,
             self._upper,
             self._lower,
             self._sense,
-            primal_tol=_TOLERANCE,
         )
-        if flag <= 0:
-            problem.rates[:] = 0.0
-            return Solution.INFEASIBLE
-        problem.rates[:] = rates
-        return Solution.SOLVED
+        problem.rates[:] = rates if solution == Solution.SOLVED else 0.0
+        return solution

@@ -17,6 +17,7 @@ class Solution(IntEnum):
 
     SOLVED = 1
     INFEASIBLE = 2
+    FAILED = 3
 
 
 class RateProblem:

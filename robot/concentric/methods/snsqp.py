@@ -5,15 +5,13 @@ With 0 ≤ s_k ≤ 1, which the print leaves out: without it a task may run back
 
 from __future__ import annotations
 
-import daqp
 import numpy as np
 
+from robot.concentric.methods.quadratic_program import EQUALITY, solve_program
 from robot.concentric.methods.rate_problem import RateProblem, Solution
 
 REGULARISATION = 0.1
 """ζ, in SI units. Far below, the task is met at any speed that rotations can give."""
-_EQUALITY = 5
-_TOLERANCE = 1e-9
 
 
 class Snsqp:
@@ -35,7 +33,7 @@ class Snsqp:
         self._upper, self._lower = np.zeros(count + 6), np.zeros(count + 6)
         self._upper[count - 1] = 1.0
         self._sense = np.zeros(count + 6, dtype=np.int32)
-        self._sense[count:] = _EQUALITY
+        self._sense[count:] = EQUALITY
 
     def solve(self, problem: RateProblem) -> Solution:
         """Fill the problem's rates and scales; zero where a program has no solution."""
@@ -47,35 +45,33 @@ class Snsqp:
         matrix[:3, count] = -problem.relative_velocity
         for bound in bounds:
             bound[count + 1 :] = 0.0
-        first = self._solve(3)
-        if first is None:
-            return self._give_up(problem)
+        first, solution = self._solve(3)
+        if solution != Solution.SOLVED:
+            return self._give_up(problem, solution)
         matrix[:3, count] = 0.0
         matrix[3:, count] = -problem.tracking_velocity
         for bound in bounds:
             bound[count + 1 : count + 4] = problem.relative_jacobian @ first[:count]
-        second = self._solve(6)
-        if second is None:
-            return self._give_up(problem)
+        second, solution = self._solve(6)
+        if solution != Solution.SOLVED:
+            return self._give_up(problem, solution)
         problem.rates[:] = second[:count]
         problem.scales[:] = first[count], second[count]
         return Solution.SOLVED
 
-    def _solve(self, rows: int) -> np.ndarray | None:
+    def _solve(self, rows: int) -> tuple[np.ndarray, Solution]:
         size = len(self._linear) + rows
-        found, _, flag, _ = daqp.solve(
+        return solve_program(
             self._hessian,
             self._linear,
             self._matrix[:rows],
             self._upper[:size],
             self._lower[:size],
             self._sense[:size],
-            primal_tol=_TOLERANCE,
         )
-        return np.asarray(found) if flag > 0 else None
 
     @staticmethod
-    def _give_up(problem: RateProblem) -> Solution:
+    def _give_up(problem: RateProblem, solution: Solution) -> Solution:
         problem.rates[:] = 0.0
         problem.scales[:] = 0.0
-        return Solution.INFEASIBLE
+        return solution
