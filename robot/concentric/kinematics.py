@@ -34,7 +34,8 @@ TOLERANCE = 1e-10
 
 _MOST_STEPS = 30
 _MOST_HALVINGS = 8
-_FINEST_COUPLING = 1e-4
+_FINEST_COUPLING = 1e-6
+_NEAR = 0.1
 
 
 @compiled
@@ -166,8 +167,9 @@ def solve_cold(q: np.ndarray, tubes: np.ndarray, torsion: np.ndarray) -> int:
     """Find the torsion of tubes that nothing is known about, by letting them couple gradually.
 
     Without coupling no tube is twisted, which is stable. The coupling grows in steps that keep the
-    stability determinant above zero, so that the solution found is stable as well, and it is the
-    one without a turn more than the rotations give.
+    stability determinant above zero and the torsion near, so that the solution found is stable as
+    well. Where several are, it is the one that untwisted tubes come to, not the one that a motion
+    may have led to; tubes exactly opposite each other come to none where they cannot stay so.
 
     Args:
         q: (2n,) translations in m, rotations in rad.
@@ -182,18 +184,24 @@ def solve_cold(q: np.ndarray, tubes: np.ndarray, torsion: np.ndarray) -> int:
         return OUTSIDE
     count = len(tubes)
     trial, residual, residual_change = torsion.copy(), np.empty(count), np.empty((count, 3 * count))
-    coupling, step = 0.0, 0.25
+    coupling, step, determinant = 0.0, 0.25, 1.0
     while coupling < 1.0:
         ahead = min(coupling + step, 1.0)
-        trial[:] = torsion
-        solved = solve_torsion(q, tubes, ahead, trial) == SOLVED
-        if solved:
+        for index in range(count):
+            trial[index] = torsion[index]
+        followed = solve_torsion(q, tubes, ahead, trial) == SOLVED
+        reached = 0.0
+        if followed:
             state = state_at_exit(q, trial)
             walk(state, q, tubes, ahead, 2 * count, False, residual, residual_change)
-            solved = _eliminate(_by_torsion(residual_change), np.empty((count, 0))) > 0.0
-        if solved:
-            coupling = ahead
-            torsion[:] = trial
+            reached = _eliminate(_by_torsion(residual_change), np.empty((count, 0)))
+        for index in range(count):
+            followed = followed and abs(trial[index] - torsion[index]) < _NEAR
+        if followed and reached > 0.5 * determinant:
+            coupling, determinant = ahead, reached
+            step = min(2.0 * step, 0.25)
+            for index in range(count):
+                torsion[index] = trial[index]
         else:
             step *= 0.5
             if step < _FINEST_COUPLING:
@@ -273,8 +281,8 @@ def solve_arm(
     residual, residual_change = np.empty(count), np.empty((count, 3 * count))
     columns = np.empty((6, 3 * count))
     state = state_at_exit(q, solution)
-    # An integer that is no literal shares its compiled walk with the drawing of backbones.
-    walk(state, q, tubes, 1.0, np.int64(0), True, residual, residual_change)
+    # From the first parameter on; a literal 0 would have the walk compiled once more for itself.
+    walk(state, q, tubes, 1.0, 0 * count, True, residual, residual_change)
     change = np.empty((count, 2 * count))
     for row in range(count):
         for parameter in range(2 * count):

@@ -127,5 +127,5 @@ def twisting(state: ArmState, index: int, bend: tuple[float, float]) -> float:
     """ψ'' of tube ``index`` where the backbone bends by ``bend`` (1/m), rad/m²."""
     if state.gain[index] == 0.0:
         return 0.0
-    angle = state.angle[index]
-    return state.gain[index] * (math.sin(angle) * bend[0] - math.cos(angle) * bend[1])
+    gain, angle = float(state.gain[index]), float(state.angle[index])
+    return gain * (math.sin(angle) * bend[0] - math.cos(angle) * bend[1])
