@@ -17,9 +17,8 @@ from robot.configuration import Instrument
 from robot.rotations import matrix_from_quaternion
 from scenes.boards.board import Board, Solid
 from scenes.boards.clearance import distances, instrument_axis
-from server.scene.ground import FLOOR
 from server.scene.palette import BALL, GROOVE, PASSED, PEDESTAL, TOUCHED, Colour
-from server.scene.shapes import Mesh, merge, revolve, round_bar
+from server.scene.shapes import Mesh, ball, ball_arc, merge, revolve, round_bar
 
 ROOT = "/board"
 NEAR = 8e-4
@@ -30,9 +29,11 @@ LINGER = 0.25
 BALL_RESOLUTION = 2e-5
 """Changes smaller than this (m) are not sent."""
 
+FLOOR = -0.16
+"""Height of the floor (m): below everything the tip reaches through the default trocar."""
+
 _ROUND = 14
 _CAP = 5
-_BALL_SIDES = 40
 _GROOVE_WIDTH = 0.0012
 _PEDESTAL = 0.008
 
@@ -198,7 +199,7 @@ class SceneBoard:
             48,
         )
         self._add("end", mark, GROOVE).position = line[-1]
-        self._ball = self._add("ball", _ball(radius), BALL)
+        self._ball = self._add("ball", ball(radius), BALL)
         self._ball.position = board.ball.position
         self._shown[f"{self._ball.name} color"] = BALL
 
@@ -238,20 +239,9 @@ def _surface(solid: Solid) -> Mesh:
     half = half if solid.kind == "capsule" else 0.0
     angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 2 * _CAP)
     lower, upper = angles[:_CAP], angles[_CAP:]
-    return revolve(_arc(radius, -half, lower) + _arc(radius, half, upper), _ROUND, smooth=True)
-
-
-def _ball(radius: float) -> Mesh:
-    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _BALL_SIDES // 2)
-    return revolve(_arc(radius, 0.0, angles), _BALL_SIDES, smooth=True)
-
-
-def _arc(radius: float, height: float, angles: NDArray[np.float64]) -> list[tuple[float, float]]:
-    """Profile corners of a ball around ``height``."""
-    across = np.maximum(radius * np.cos(angles), 0.0)
-    across[np.abs(np.cos(angles)) < 1e-9] = 0.0
-    up = height + radius * np.sin(angles)
-    return [(float(r), float(z)) for r, z in zip(across, up, strict=True)]
+    return revolve(
+        ball_arc(radius, -half, lower) + ball_arc(radius, half, upper), _ROUND, smooth=True
+    )
 
 
 def _box(size: NDArray[np.float64]) -> Mesh:

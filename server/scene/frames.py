@@ -1,6 +1,9 @@
-"""Axes of the frames people talk about, hidden until asked for."""
+"""Axes of the frames people talk about."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import viser
@@ -12,55 +15,80 @@ ROOT = "/frames"
 LABEL_SCALE = 0.7
 
 
-class SceneFrames:
-    """``/frames``: base, trocar, flange and true tip; x red, y green, z blue."""
+class Axes(NamedTuple):
+    """Axes to be drawn at a scene node: length and radius in m, and a label above, or ""."""
 
-    def __init__(self, server: viser.ViserServer, flange: str, trocar: str) -> None:
+    node: str
+    length: float
+    radius: float
+    label: str = ""
+
+
+class SceneFrames:
+    """Axes: x red, y green, z blue; hidden until asked for.
+
+    Attributes:
+        words: which frames they are, for people.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        words: str,
+        tips: Sequence[Axes],
+        standing: Sequence[Axes],
+    ) -> None:
         """Build the axes.
 
         Args:
             server: draws.
-            flange: scene node of the flange.
-            trocar: scene node of the trocar.
+            words: which frames they are, for people.
+            tips: of the true tips, which :meth:`update` moves.
+            standing: of other nodes, which carry them along.
         """
-        scene = server.scene
-        self._tip = scene.add_frame(
-            f"{ROOT}/tip",
-            axes_length=0.014,
-            axes_radius=0.0004,
-            origin_radius=0.0009,
-            origin_color=TRUE,
-        )
-        base = scene.add_frame(f"{ROOT}/base", axes_length=0.12, axes_radius=0.002)
-        on_flange = scene.add_frame(f"{flange}/axes", axes_length=0.09, axes_radius=0.0015)
-        on_trocar = scene.add_frame(f"{trocar}/axes", axes_length=0.03, axes_radius=0.0005)
-        self._nodes: list[viser.SceneNodeHandle] = [self._tip, base, on_flange, on_trocar]
-        for node, name, high in (
-            (self._tip, "tip", 0.016),
-            (base, "base", 0.13),
-            (on_flange, "flange", 0.1),
-        ):
-            scene.add_label(
-                f"{node.name}/label",
-                name,
-                position=(0.0, 0.0, high),
-                font_screen_scale=LABEL_SCALE,
-                anchor="bottom-center",
+        self._tips = [
+            server.scene.add_frame(
+                axes.node,
+                axes_length=axes.length,
+                axes_radius=axes.radius,
+                origin_radius=2.25 * axes.radius,
+                origin_color=TRUE,
             )
+            for axes in tips
+        ]
+        self._nodes: list[viser.SceneNodeHandle] = [
+            *self._tips,
+            *(
+                server.scene.add_frame(axes.node, axes_length=axes.length, axes_radius=axes.radius)
+                for axes in standing
+            ),
+        ]
+        for axes in (*tips, *standing):
+            if axes.label:
+                server.scene.add_label(
+                    f"{axes.node}/label",
+                    axes.label,
+                    position=(0.0, 0.0, 1.1 * axes.length),
+                    font_screen_scale=LABEL_SCALE,
+                    anchor="bottom-center",
+                )
+        self.words = words
         self.visible = False
 
     @property
     def visible(self) -> bool:
         """Whether the axes are shown."""
-        return bool(self._tip.visible)
+        return bool(self._tips[0].visible)
 
     @visible.setter
     def visible(self, visible: bool) -> None:
         for node in self._nodes:
             node.visible = visible
 
-    def update(self, position: NDArray[np.float64], wxyz: NDArray[np.float64]) -> None:
-        """Move the tip's axes: (3,) m and (4,) in the world; costs nothing while hidden."""
-        if self.visible:
-            self._tip.position = position
-            self._tip.wxyz = wxyz
+    def update(self, *poses: tuple[NDArray[np.float64], NDArray[np.float64]]) -> None:
+        """Move the tips' axes, each to (3,) m and (4,) in the world; free while hidden."""
+        if not self.visible:
+            return
+        for tip, (position, wxyz) in zip(self._tips, poses, strict=True):
+            tip.position = position
+            tip.wxyz = wxyz

@@ -1,4 +1,4 @@
-"""The clamped target: where the tip is asked to be, shown when it is not there yet."""
+"""The clamped target: where a tip is asked to be, shown when it is not there yet."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from robot.configuration import Instrument
 from server.scene.palette import DESIRED
-from server.scene.shapes import round_bar
+from server.scene.shapes import Mesh
 
 ROOT = "/ghost"
 PERIOD = 1.0 / 15.0
@@ -18,24 +17,30 @@ RADIANS_AS_METRES = 0.02
 
 
 class SceneGhost:
-    """``/ghost``: a translucent tip with its axes at the desired pose."""
+    """A translucent tip at the desired pose."""
 
-    def __init__(self, server: viser.ViserServer, instrument: Instrument) -> None:
-        """Build the ghost, hidden."""
-        radius = instrument.disk_diameter_m / 2
+    def __init__(self, server: viser.ViserServer, root: str, tip: Mesh, axes: float = 0.0) -> None:
+        """Build the ghost, hidden.
+
+        Args:
+            server: draws.
+            root: scene node of the ghost.
+            tip: its shape, in the frame of the tip.
+            axes: length of the axes at it, m; none where only its position counts.
+        """
         self._root = server.scene.add_frame(
-            ROOT,
-            axes_length=4.0 * radius,
-            axes_radius=0.10 * radius,
-            origin_radius=0.25 * radius,
+            root,
+            show_axes=axes > 0.0,
+            axes_length=axes,
+            axes_radius=0.025 * axes,
+            origin_radius=0.0625 * axes,
             origin_color=DESIRED,
             visible=False,
         )
-        bar = round_bar(-3.4 * radius, 0.12 * radius, 1.15 * radius, 0.25 * radius, 32)
         server.scene.add_mesh_simple(
-            f"{ROOT}/tip",
-            bar.vertices,
-            bar.faces,
+            f"{root}/tip",
+            tip.vertices,
+            tip.faces,
             color=DESIRED,
             opacity=0.55,
             cast_shadow=False,

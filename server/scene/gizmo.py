@@ -50,13 +50,16 @@ class GizmoLink(Protocol):
 class SceneGizmo:
     """``/gizmo``: follows the commanded tip until somebody drags it."""
 
-    def __init__(self, server: viser.ViserServer, link: GizmoLink, timeout_s: float) -> None:
+    def __init__(
+        self, server: viser.ViserServer, link: GizmoLink, timeout_s: float, *, turns: bool
+    ) -> None:
         """Build the gizmo.
 
         Args:
             server: draws, and calls back on its event loop.
             link: takes the samples.
             timeout_s: age at which a sample is stale.
+            turns: it has rings that turn it.
         """
         self._link = link
         self._timeout = timeout_s
@@ -69,7 +72,12 @@ class SceneGizmo:
         self._followed = 0.0
         self._put_back = 0.0
         self.control = server.scene.add_transform_controls(
-            NAME, scale=SIZE, line_width=3.0, depth_test=False, opacity=RESTING_OPACITY
+            NAME,
+            scale=SIZE,
+            line_width=3.0,
+            disable_rotations=not turns,
+            depth_test=False,
+            opacity=RESTING_OPACITY,
         )
         self.control.on_update(self._on_update)
 

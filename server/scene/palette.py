@@ -17,6 +17,20 @@ TRUE: Colour = (31, 157, 107)
 TENDONS: tuple[Colour, ...] = ((190, 22, 18), (205, 140, 0), (0, 110, 150), (140, 20, 130))
 """Tendons 1 to 4, at 0, 90, 180 and 270 degrees about the segment's z axis."""
 
+TUBES: tuple[Colour, ...] = (
+    (14, 128, 150),
+    (176, 52, 120),
+    (132, 98, 30),
+    (70, 82, 104),
+    (104, 132, 20),
+    (150, 76, 60),
+)
+"""Concentric tubes, the innermost first; the page's plots have the same."""
+ENDOSCOPE: Colour = (150, 156, 168)
+CHANNEL: Colour = (40, 44, 52)
+WARNING: Colour = (196, 26, 36)
+"""What should be and is not; always said in words or by a broken line too."""
+
 BACKBONE: Colour = (52, 56, 64)
 DISK: Colour = (112, 118, 130)
 PORT: Colour = (54, 64, 80)

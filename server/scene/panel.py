@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import viser
 
-from server.scene.camera import NAMES, SceneCamera
-from server.scene.frames import SceneFrames
-from server.scene.ground import SceneGround
+from server.scene.camera import SceneCamera
+from server.scene.robot_scene import RobotScene
 from server.scene.trails import SceneTrails
-from server.scene.trocar import WALL_OPACITY, SceneTrocar
 
 
 class ScenePanel:
@@ -17,32 +15,25 @@ class ScenePanel:
     def __init__(
         self,
         server: viser.ViserServer,
+        robot: RobotScene,
         camera: SceneCamera,
-        frames: SceneFrames,
         trails: SceneTrails,
-        trocar: SceneTrocar,
-        ground: SceneGround,
     ) -> None:
         """Build the panel, folded to its title."""
         gui = server.gui
         gui.configure_theme(control_width="small", show_logo=False, show_share_button=False)
         gui.set_panel_label("Scene")
-        views = gui.add_button_group("View", NAMES, hint="Move the camera of this browser")
+        views = gui.add_button_group(
+            "View", camera.viewpoints.names, hint="Move the camera of this browser"
+        )
         shown_frames = gui.add_checkbox(
-            "Frames", False, hint="Axes of base, flange, trocar and tip: x red, y green, z blue"
+            "Frames", robot.frames.visible, hint=f"{robot.frames.words}: x red, y green, z blue"
         )
         shown_trails = gui.add_checkbox(
             "Trails", True, hint="Last 20 s of the tip: desired blue and wide, true green and thin"
         )
         shown_shadows = gui.add_checkbox("Shadows", False, hint="Needs a graphics card")
-        opacity = gui.add_slider(
-            "Wall opacity",
-            min=0.0,
-            max=1.0,
-            step=0.05,
-            initial_value=WALL_OPACITY,
-            hint="Of the body wall: 0 hides it, 1 is opaque",
-        )
+        robot.add_controls(gui)
         gui.main_panel.minimize()
 
         @views.on_click
@@ -52,7 +43,7 @@ class ScenePanel:
 
         @shown_frames.on_update
         async def _(_: object) -> None:
-            frames.visible = shown_frames.value
+            robot.frames.visible = shown_frames.value
 
         @shown_trails.on_update
         async def _(_: object) -> None:
@@ -60,8 +51,4 @@ class ScenePanel:
 
         @shown_shadows.on_update
         async def _(_: object) -> None:
-            ground.shadows(shown_shadows.value)
-
-        @opacity.on_update
-        async def _(_: object) -> None:
-            trocar.fade(opacity.value)
+            robot.ground.shadows(shown_shadows.value)

@@ -72,6 +72,22 @@ def round_bar(bottom: float, top: float, radius: float, edge: float, sides: int)
     return revolve(corners, sides)
 
 
+def ball(radius: float, sides: int = 40) -> Mesh:
+    """A ball around the origin, m."""
+    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, sides // 2)
+    return revolve(ball_arc(radius, 0.0, angles), sides, smooth=True)
+
+
+def ball_arc(
+    radius: float, height: float, angles: NDArray[np.float64]
+) -> list[tuple[float, float]]:
+    """Corners of the profile of a ball around ``height``, at latitudes ``angles`` (rad)."""
+    across = np.maximum(radius * np.cos(angles), 0.0)
+    across[np.abs(np.cos(angles)) < 1e-9] = 0.0
+    up = height + radius * np.sin(angles)
+    return [(float(r), float(z)) for r, z in zip(across, up, strict=True)]
+
+
 def merge(*meshes: Mesh) -> Mesh:
     """One mesh of several."""
     offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])

@@ -1,7 +1,8 @@
 """The picture of the robot in every connected browser, thirty times a second.
 
-One thread reads the newest record and sends what changed; the modules ``scene_*`` beside this one
-each draw one thing. Nothing here decides anything: the gizmo hands its samples to the link.
+One thread reads the newest record and sends what changed; what belongs to one robot stands behind
+:class:`server.scene.robot_scene.RobotScene`, and the modules beside this one each draw one thing.
+Nothing here decides anything: the gizmo hands its samples to the link.
 """
 
 from __future__ import annotations
@@ -17,34 +18,20 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from frontend_assets.robot_model import ensure_model
-from robot.compiled import cache_directory
 from robot.configuration import Configuration
 from robot.errors import KeyholeError
 from robot.records import Safety
-from robot.rotations import angle_between, matrix_from_quaternion
-from robot.segment import tip_rotation
-from robot.sensing.tip_correction import expected_pose
-from robot.urdf import FLANGE
-from scenes.boards.board import BOARD_NAMES, board
-from server.scene.board import SceneBoard
 from server.scene.camera import SceneCamera
-from server.scene.frames import SceneFrames
-from server.scene.ghost import SceneGhost
+from server.scene.concentric_scene import ConcentricScene
 from server.scene.gizmo import GizmoLink, SceneGizmo
-from server.scene.ground import SceneGround
+from server.scene.instrument_scene import InstrumentScene
 from server.scene.panel import ScenePanel
-from server.scene.robot import SceneRobot
-from server.scene.segment import SceneSegment
+from server.scene.robot_scene import RobotScene
 from server.scene.trails import SceneTrails
-from server.scene.trocar import ROOT as TROCAR
-from server.scene.trocar import SceneTrocar
 
 PERIOD = 1.0 / 30.0
 UNWATCHED_PERIOD = 1.0
 """Between two pictures while no browser is connected, s: the next one starts nearly right."""
-BOARD_PERIOD = 0.5
-"""Between two looks at which board is there, s."""
 
 _MOST_FAILURES = 8
 
@@ -55,7 +42,7 @@ class SceneLink(GizmoLink, Protocol):
     """The part of :class:`server.memory.link.WebLink` that the view uses."""
 
     def snapshot(self) -> NDArray[Any]:
-        """The newest record, shape (1,), :data:`robot.records.RECORD`."""
+        """The newest record, shape (1,), of the robot's types."""
 
     def status(self) -> dict[str, Any]:
         """What changes rarely; only ``board`` is used here, the name of the one that is there."""
@@ -65,6 +52,8 @@ class SceneView:
     """Draws the newest record until stopped.
 
     Attributes:
+        robot: the nodes of the robot that the configuration chooses.
+        gizmo: the one at the led tip.
         on_failure: called from its thread with the first failure of each kind, in words.
     """
 
@@ -81,39 +70,27 @@ class SceneView:
             server: draws; stays the caller's to stop.
             configuration: dimensions and where things start.
             link: records come from it, gizmo samples go to it.
-            model_directory: holds ``keyhole.urdf`` and its meshes; without it, the ones that
-                belong to the configuration are found, or built once and kept.
+            model_directory: of the instrument, see
+                :class:`server.scene.instrument_scene.InstrumentScene`.
 
         Raises:
             OSError: a file of the model cannot be read.
         """
-        if model_directory is None:
-            model_directory = ensure_model(configuration, cache_directory().parent)
-        self._server, self._link, self._configuration = server, link, configuration
-        trocar = np.array(configuration.trocar.position_m)
-        inward = np.array(configuration.start.shaft_direction)
-        inward /= np.linalg.norm(inward)
-        inside = 1.0 - configuration.start.lambda_along_shaft
-        tip = trocar + inside * configuration.instrument.shaft_length_m * inward
-        joints = [joint.name for joint in configuration.arm.joints]
+        self._server, self._link = server, link
         with server.atomic():
-            self._ground = SceneGround(server)
-            self._robot = SceneRobot(server, model_directory, joints)
-            self._segment = SceneSegment(server, configuration.instrument)
-            self._trocar = SceneTrocar(server, configuration)
-            self.board = SceneBoard(server, configuration.instrument)
-            self.board.show(board(configuration.simulation.board, configuration))
+            self.robot = _scene_of(server, configuration, link, model_directory)
             self._trails = SceneTrails(server)
-            self._ghost = SceneGhost(server, configuration.instrument)
-            self._frames = SceneFrames(server, self._robot.paths[FLANGE], TROCAR)
-            self._camera = SceneCamera(server, trocar, tip, inward)
+            self._camera = SceneCamera(server, self.robot.viewpoints, *self.robot.work(None))
             self.gizmo = SceneGizmo(
-                server, link, configuration.teleoperation.gizmo_timeout_ms * 1e-3
+                server,
+                link,
+                configuration.teleoperation.gizmo_timeout_ms * 1e-3,
+                turns=self.robot.TURNED_BY_GIZMO,
             )
-            ScenePanel(server, self._camera, self._frames, self._trails, self._trocar, self._ground)
+            ScenePanel(server, self.robot, self._camera, self._trails)
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
-        self._drawn = self._looked = -np.inf
+        self._drawn = -np.inf
         self._failures: set[str] = set()
         self.on_failure: Callable[[str], None] = lambda _: None
 
@@ -169,53 +146,37 @@ class SceneView:
             return
         watched = bool(clients)
         truth, report = record["truth"], record["outcome"]["report"]
-        _check_drawable(truth)
+        _check_drawable(truth, self.robot.DRAWN)
         self._trails.update(now, report["desired_position"], truth["position"], draw=watched)
         if not watched and now - self._drawn < UNWATCHED_PERIOD:
             return
         self._drawn = now
-        self._find_board(now)
+        self.robot.prepare(now)
         with self._server.atomic():
             self._draw(now, record)
 
-    def _find_board(self, now: float) -> None:
-        """Show the board that the robot has before it, when it has changed."""
-        if now - self._looked < BOARD_PERIOD:
-            return
-        self._looked = now
-        name = self._link.status()["board"]
-        if name != self.board.name and name in BOARD_NAMES:
-            self.board.show(board(name, self._configuration))
-
     def _draw(self, now: float, record: Any) -> None:
-        truth, report = record["truth"], record["outcome"]["report"]
-        tip = np.empty((3, 3))
-        matrix_from_quaternion(truth["wxyz"], tip)
-        bend = np.empty((3, 3))
-        tip_rotation(float(truth["uv"][0]), float(truth["uv"][1]), bend)
-        trocar = np.array(record["input"]["trocar_position"])
-        inward = truth["shaft_end"] - truth["shaft_base"]
-        inward = inward / np.linalg.norm(inward)
-        self._robot.update(truth["q"])
-        self._segment.update(truth["shaft_end"], tip @ bend.T, truth["uv"])
-        self.board.update(now, truth, tip @ bend.T)
-        self._trocar.update(trocar, -inward)
-        self._frames.update(truth["position"], truth["wxyz"])
-        self._camera.update(trocar, truth["position"], inward)
-        desired = np.empty((3, 3))
-        matrix_from_quaternion(report["desired_wxyz"], desired)
-        away = float(np.linalg.norm(report["desired_position"] - truth["position"]))
-        turned = angle_between(desired, tip)
-        self._ghost.update(now, report["desired_position"], report["desired_wxyz"], (away, turned))
+        self.robot.draw(now, record)
+        self._camera.update(*self.robot.work(record))
         enabled = record["outcome"]["state"]["safety"] == Safety.ENABLED
-        position, wxyz = np.empty(3), np.empty(4)
-        expected_pose(np.array([record["outcome"]]), position, wxyz)
+        position, wxyz = self.robot.gizmo_pose(np.array([record["outcome"]]))
         self.gizmo.update(now, position, wxyz, ready=bool(enabled))
 
 
-def _check_drawable(truth: Any) -> None:
+def _scene_of(
+    server: viser.ViserServer,
+    configuration: Configuration,
+    link: SceneLink,
+    model_directory: Path | None,
+) -> RobotScene:
+    """Build the nodes of the robot that ``configuration`` chooses."""
+    if configuration.robot == "concentric":
+        return ConcentricScene(server, configuration)
+    return InstrumentScene(server, configuration, link.status, model_directory)
+
+
+def _check_drawable(truth: Any, fields: tuple[str, ...]) -> None:
     """A browser that is sent what is no number shows nothing, and says nothing."""
-    parts = ("q", "uv", "position", "wxyz", "shaft_base", "shaft_end")
-    for part in parts:
-        if not np.isfinite(truth[part]).all():
-            raise FloatingPointError(f"the robot's {part} is no number")
+    for field in fields:
+        if not np.isfinite(truth[field]).all():
+            raise FloatingPointError(f"the robot's {field} is no number")

@@ -20,6 +20,8 @@ from robot.records import RECORD, LeaderKind, Safety
 from robot.rotations import matrix_from_quaternion
 from robot.urdf import urdf_text
 from server.memory.mapped import MappedReadError
+from server.scene.instrument_scene import InstrumentScene
+from server.scene.view import SceneView
 
 
 class Sample(NamedTuple):
@@ -90,6 +92,12 @@ class Recorder:
         assert timeout_s == pytest.approx(self.timeout)
         assert np.linalg.norm(wxyz) == pytest.approx(1.0)
         self.samples.append(Sample(time.monotonic(), sequence, clutch, position))
+
+
+def instrument_of(view: SceneView) -> InstrumentScene:
+    """What is drawn of the instrument."""
+    assert isinstance(view.robot, InstrumentScene)
+    return view.robot
 
 
 def until(condition: Callable[[], bool], seconds: float = 10.0) -> None:

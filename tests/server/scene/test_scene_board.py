@@ -11,9 +11,10 @@ from robot.rotations import matrix_from_quaternion
 from scenes.boards.board import BOARD_NAMES, board
 from scenes.boards.clearance import distances
 from server.scene.board import LINGER
+from server.scene.instrument_scene import BOARD_PERIOD
 from server.scene.palette import BALL, PASSED, TOUCHED
-from server.scene.view import BOARD_PERIOD, PERIOD, SceneView
-from tests.server.scene.stage import Recorder, handle, messages
+from server.scene.view import PERIOD, SceneView
+from tests.server.scene.stage import Recorder, handle, instrument_of, messages
 from tests.server.scene.viser_browser import ViserBrowser
 
 
@@ -30,13 +31,13 @@ def put(link: Recorder, view: SceneView, name: str, now: float) -> None:
     """Let the link tell of another board, and wait until it is looked at."""
     link.board = name
     view.step(now)
-    assert view.board.name == name
+    assert instrument_of(view).board.name == name
 
 
 def test_the_configured_board_is_there_from_the_start(
     server: viser.ViserServer, view: SceneView, configuration: Configuration
 ) -> None:
-    assert view.board.name == configuration.simulation.board == "pegboard"
+    assert instrument_of(view).board.name == configuration.simulation.board == "pegboard"
     assert {"plate", "green peg", "red peg", "blue peg", "yellow peg"} <= names_below(server)
 
 
@@ -58,7 +59,7 @@ def test_a_board_that_is_not_known_changes_nothing(view: SceneView, link: Record
     for name in ("", "chessboard"):
         link.board = name
         view.step(100.0 + len(name))
-        assert view.board.name == "pegboard"
+        assert instrument_of(view).board.name == "pegboard"
 
 
 @pytest.mark.parametrize("name", [name for name in BOARD_NAMES if name != "none"])
@@ -70,12 +71,12 @@ def test_every_solid_is_drawn_where_it_is(
     name: str,
 ) -> None:
     put(link, view, name, 10.0)
-    assert {part.solids for part in view.board._parts}
-    drawn = [solid for part in view.board._parts for solid in part.solids]
+    assert {part.solids for part in instrument_of(view).board._parts}
+    drawn = [solid for part in instrument_of(view).board._parts for solid in part.solids]
     assert {solid.name for solid in drawn} == {
         solid.name for solid in board(name, configuration).solids
     }
-    for part in view.board._parts:
+    for part in instrument_of(view).board._parts:
         vertices = np.asarray(part.handle.vertices, dtype=np.float64)
         # Corners of the mesh lie on the surface of one of its solids.
         away = np.min([np.abs(distances(solid, vertices)) for solid in part.solids], axis=0)
@@ -102,7 +103,11 @@ def test_what_is_touched_lights_up_and_goes_out(
 ) -> None:
     put(link, view, "pegboard", 10.0)
     truth = link.record["truth"][0]
-    peg = next(part for part in view.board._parts if part.ring < 0 and "red" in part.solids[0].name)
+    peg = next(
+        part
+        for part in instrument_of(view).board._parts
+        if part.ring < 0 and "red" in part.solids[0].name
+    )
     # The tip beside the red peg: its foremost point a hair from the surface.
     solid = peg.solids[0]
     tip = np.empty((3, 3))

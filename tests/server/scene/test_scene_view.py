@@ -11,10 +11,19 @@ from robot.configuration import Configuration
 from robot.records import RECORD
 from robot.rotations import matrix_from_quaternion
 from robot.segment import shape_frames
-from server.scene.camera import FIELD_OF_VIEW, INSTRUMENT, named_view
+from server.scene.camera import FIELD_OF_VIEW
+from server.scene.instrument_views import INSTRUMENT, named_view
 from server.scene.trails import MOST_POINTS, SAMPLE_PERIOD, SECONDS
 from server.scene.view import PERIOD, SceneView
-from tests.server.scene.stage import Recorder, handle, messages, pose, somewhere, until
+from tests.server.scene.stage import (
+    Recorder,
+    handle,
+    instrument_of,
+    messages,
+    pose,
+    somewhere,
+    until,
+)
 from tests.server.scene.viser_browser import ViserBrowser
 
 
@@ -41,7 +50,7 @@ def test_the_drawn_arm_agrees_with_the_kinematics(
     for index in range(5):
         link.move(somewhere(link.start, rng))
         view.step(10.0 * (index + 1))
-        drawn = pose(server, view._robot.paths["segment_base"])
+        drawn = pose(server, instrument_of(view).arm.paths["segment_base"])
         truth = link.record["truth"][0]
         assert drawn.translation() == pytest.approx(truth["shaft_end"], abs=3e-5)
         instrument = pose(server, "/instrument")
