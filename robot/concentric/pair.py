@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from robot.concentric.design import Concentric, ConcentricStart
-from robot.concentric.kinematics import SOLVED, solve_arm
+from robot.concentric.kinematics import SOLVED, solve_arm, solve_cold
 from robot.concentric.tubes import tube_array
 
 
@@ -98,6 +98,17 @@ class ArmPair:
         out.relative_jacobian[:, size:] = out.jacobian[1, :3]
         out.tracking_jacobian[:, :size] = out.jacobian[0, :3]
         return SOLVED
+
+    def evaluate_cold(self, out: PairKinematics) -> int:
+        """Like :meth:`evaluate` where nothing is known of the torsion; slower."""
+        n = self.count
+        guess = np.zeros(2 * n)
+        for arm in range(2):
+            own = out.q[2 * n * arm : 2 * n * (arm + 1)]
+            status = solve_cold(own, self.tubes, guess[n * arm : n * (arm + 1)])
+            if status != SOLVED:
+                return int(status)
+        return self.evaluate(out, guess)
 
     def guess_after(self, now: PairKinematics, q: np.ndarray, guess: np.ndarray) -> None:
         """Fill ``guess`` (2n,) with the torsion rates at ``q`` (4n,), to first order."""

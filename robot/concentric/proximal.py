@@ -20,6 +20,7 @@ import numpy as np
 
 from robot.compiled import compiled
 from robot.concentric.design import Concentric
+from robot.concentric.tubes import MeaninglessTubes
 
 
 class Proximal:
@@ -37,6 +38,7 @@ class Proximal:
     """
 
     def __init__(self, design: Concentric) -> None:
+        """Read them; raises ``MeaninglessTubes`` where the margins leave a tube no room."""
         limits = design.limits
         lengths = np.array([tube.length_mm for tube in design.tubes]) * 1e-3
         spacing, segment = limits.motor_spacing_mm * 1e-3, limits.minimum_segment_mm * 1e-3
@@ -46,10 +48,20 @@ class Proximal:
         self.upper = -spacing * outward
         self.gap_lower = np.full(self.count - 1, spacing)
         self.gap_upper = lengths[:-1] - lengths[1:] - segment
+        self._refuse_without_room()
         self.speed = limits.translation_speed_mm_s * 1e-3
         self.acceleration = limits.translation_acceleration_mm_s2 * 1e-3
         for bounds in (self.lower, self.upper, self.gap_lower, self.gap_upper, lengths):
             bounds.setflags(write=False)
+
+    def _refuse_without_room(self) -> None:
+        rooms = [*(self.gap_upper - self.gap_lower), self.upper[-1] - self.lower[-1]]
+        for number, room in enumerate(rooms, 1):
+            if not room > 0.0:
+                raise MeaninglessTubes(
+                    number,
+                    f"minimum_segment_mm and motor_spacing_mm leave it {1e3 * room:g} mm to move",
+                )
 
     def rows(self) -> np.ndarray:
         """The (n − 1, 2n) rows of [β, α] whose rates are those of the gaps."""

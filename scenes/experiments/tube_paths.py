@@ -69,15 +69,6 @@ def lissajous() -> np.ndarray:
     return 1e-3 * np.column_stack([x, np.zeros(_POINTS), z])
 
 
-def inward() -> np.ndarray:
-    """60 mm toward −x and +y in the plane of configuration 1: offsets (60, 3), m, 1 mm apart.
-
-    Both arms bend in that plane, so their tips move in it by translations only, at 5 mm/s at most.
-    """
-    along = 1e-3 * np.arange(1, 61) / math.sqrt(2.0)
-    return np.column_stack([-along, along, np.zeros(60)])
-
-
 def _offset(file: str, line: int, column: str, text: str) -> float:
     try:
         value = float(text)

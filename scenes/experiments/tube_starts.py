@@ -1,4 +1,4 @@
-"""Random configurations of the two concentric-tube arms, inside (1), reached without snapping."""
+"""Random configurations of the two concentric-tube arms, inside (1) and far from snapping."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ SHOWN_MIN_M, SHOWN_MAX_M = 0.010, 0.100
 ROOM_M = 0.005
 """Least distance from the limits, but for the tubes' ends."""
 STABILITY_MIN = 0.2
-_TURNS = 24
 _TRIES = 10_000
 
 
@@ -33,22 +32,14 @@ def _translations(proximal: Proximal, rng: np.random.Generator) -> np.ndarray | 
     return np.asarray(beta) if inside else None
 
 
-def _is_reached(pair: ArmPair, kinematics: PairKinematics, q: np.ndarray) -> bool:
-    """Whether turning the tubes from aligned to ``q`` (4n,) never comes near snapping.
+def _is_stable(pair: ArmPair, kinematics: PairKinematics, q: np.ndarray) -> bool:
+    """Whether the tubes stand at ``q`` (4n,) far from snapping, on the branch without a turn more.
 
-    A determinant above 0 at one configuration is necessary but not sufficient.
+    A determinant above 0 is necessary only; ``evaluate_cold`` follows it from untwisted tubes.
     """
-    n = pair.count
-    turned = np.concatenate([np.arange(n, 2 * n), np.arange(3 * n, 4 * n)])
-    kinematics.torsion[:] = 0.0
-    for turn in range(_TURNS + 1):
-        kinematics.q[:] = q
-        kinematics.q[turned] *= turn / _TURNS
-        if pair.evaluate(kinematics, kinematics.torsion) != SOLVED:
-            return False
-        if kinematics.stability.min() < STABILITY_MIN:
-            return False
-    return True
+    kinematics.q[:] = q
+    solved = pair.evaluate_cold(kinematics) == SOLVED
+    return solved and bool(kinematics.stability.min() >= STABILITY_MIN)
 
 
 def random_starts(design: Concentric, count: int, seed: int) -> np.ndarray:
@@ -75,9 +66,9 @@ def random_starts(design: Concentric, count: int, seed: int) -> np.ndarray:
             beta = _translations(proximal, rng)
             if beta is not None:
                 parts += [beta, rng.uniform(-np.pi, np.pi, n)]
-        if len(parts) == 4 and _is_reached(pair, kinematics, np.concatenate(parts)):
+        if len(parts) == 4:
             starts[found] = np.concatenate(parts)
-            found += 1
+            found += _is_stable(pair, kinematics, starts[found])
     if found < count:
         raise RuntimeError("the tubes leave no room for random starts")
     return starts

@@ -9,7 +9,7 @@ import numpy as np
 from robot.concentric.design import Concentric
 from robot.concentric.pair import start_of
 from robot.errors import UnknownName
-from scenes.experiments.tube_paths import inward, lissajous, rectangle
+from scenes.experiments.tube_paths import lissajous, rectangle
 from scenes.experiments.tube_starts import random_starts
 
 RANDOM = "random"
@@ -21,7 +21,7 @@ TITLES = {
     "rectangle": "A's tip on a rectangle of 30 x 20 mm, 100 points",
     "lissajous": "A's tip on a Lissajous figure of 30 x 20 mm, 100 points",
     RANDOM: "the Lissajous figure from random configurations (--count, --seed)",
-    NEAR_INFEASIBLE: "A's tip 60 mm inward, to where rotations help no more, 60 points",
+    NEAR_INFEASIBLE: "the Lissajous figure, with B asked 5 mm back faster than tubes can go",
     TRADE_OFF: "rectangle and Lissajous figure: translation of the tubes against their speed",
     POINTS: "a file of points (--path FILE), offsets x_mm,y_mm,z_mm from A's first tip",
 }
@@ -29,15 +29,17 @@ TITLES = {
 
 
 class TubeMotion(NamedTuple):
-    """What A's tip shall do.
+    """What A's tip and the relative position shall do.
 
     Attributes:
         name: of the path.
         offsets: (points, 3) of A's tip from its first position, m.
+        relative_offset: by how much x_AB shall differ from that of the start, m.
     """
 
     name: str
     offsets: np.ndarray
+    relative_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def motions(name: str) -> tuple[TubeMotion, ...]:
@@ -48,7 +50,7 @@ def motions(name: str) -> tuple[TubeMotion, ...]:
     if name in ("lissajous", RANDOM):
         return (TubeMotion("lissajous", lissajous()),)
     if name == NEAR_INFEASIBLE:
-        return (TubeMotion(name, inward()),)
+        return (TubeMotion(name, lissajous(), (0.0, 0.0, -0.005)),)
     raise UnknownName("concentric-tube experiment", name, tuple(TITLES))
 
 

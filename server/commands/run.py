@@ -10,16 +10,23 @@ from typing import Any
 
 from robot.calibration import Calibration
 from robot.configuration import Configuration
-from robot.errors import KeyholeError
 from robot.priority.levels import CASE_NAMES
 from scenes.boards.board import BOARD_NAMES
 from scenes.experiments import experiment, names
 from scenes.path_file import parse_csv
 from server.calibration import file as calibration_file
 from server.commands.progress_bar import ProgressBar
+from server.commands.run_refusals import RunArgumentError, check_writable, refuse_options, text_of
+from server.commands.run_tubes import (
+    TUBE_OPTIONS,
+    add_tube_arguments,
+    execute_tubes,
+    is_for_tubes,
+    print_tube_list,
+)
 from server.commands.stop_signals import StopSignals
 from server.configuration_file import load
-from server.control.loop import COORDINATE_NAMES, SOLVER_NAMES
+from server.control.instrument_loop import COORDINATE_NAMES, SOLVER_NAMES
 from server.recording.writer import RecordingWriter
 from server.run.figure_table import printed
 from server.run.figures import result_document
@@ -37,18 +44,13 @@ from server.run.options import (
 ALL = "all"
 
 
-class RunArgumentError(KeyholeError):
-    """What was asked of ``keyhole run`` cannot be done."""
-
-    code = "run_argument"
-
-
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``run`` to the command line."""
     parser = subparsers.add_parser("run", help="run an experiment or a path without a browser")
     parser.add_argument("name", nargs="?", help=f"an experiment (see --list), or {ALL}")
     parser.add_argument("--path", metavar="FILE", help="play a CSV path instead of an experiment")
     parser.add_argument("--list", action="store_true", help="list the experiments and stop")
+    add_tube_arguments(parser)
     parser.add_argument("--case", choices=tuple(CASE_NAMES), help="priority case")
     parser.add_argument("--solver", choices=tuple(SOLVER_NAMES), help="how the levels are solved")
     parser.add_argument(
@@ -109,11 +111,15 @@ def execute(arguments: argparse.Namespace) -> int:
     configuration = load(arguments.config)
     if arguments.list:
         _print_list(configuration)
+        print_tube_list()
         return 0
+    if is_for_tubes(arguments):
+        return execute_tubes(arguments, configuration.concentric)
+    refuse_options(arguments, TUBE_OPTIONS, "it is of the concentric-tube experiments")
     many = arguments.name == ALL and arguments.path is None
     runs = _all(arguments, configuration) if many else [_one(arguments, configuration)]
-    _check_writable(arguments.json)
-    _check_writable(arguments.trace)
+    check_writable(arguments.json)
+    check_writable(arguments.trace)
     calibration = given_calibration(arguments.calibration)
     documents: list[dict[str, Any]] = []
     with StopSignals() as stopped:
@@ -189,14 +195,11 @@ def _one(arguments: argparse.Namespace, configuration: Configuration) -> RunOpti
             experiment(arguments.name, configuration), configuration, case, **choices
         )
     else:
-        try:
-            text = Path(arguments.path).read_text()
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "is not text (UTF-8)"
-            raise RunArgumentError(f"{arguments.path}: {reason}") from None
         fields = {"solver": priority.solver, "coordinates": priority.coordinates} | choices
         name = Path(arguments.path).name
-        options = RunOptions(name, parse_csv(text, arguments.path), case, **fields)
+        options = RunOptions(
+            name, parse_csv(text_of(arguments.path), arguments.path), case, **fields
+        )
     return dataclasses.replace(options, path=cut(options.path, arguments.seconds))
 
 
@@ -219,17 +222,6 @@ def _all(arguments: argparse.Namespace, configuration: Configuration) -> list[Ru
     return runs
 
 
-def _check_writable(name: str | None) -> None:
-    """Refuse before the run what could not be written after it."""
-    if name is None or name == "-":
-        return
-    try:
-        with open(name, "a"):
-            pass
-    except OSError as error:
-        raise RunArgumentError(f"{name} cannot be written: {error.strerror}") from None
-
-
 def _write_trace(name: str, result: RunResult) -> None:
     with open(name, "w", newline="") as file:
         file.write(",".join(TRACE_COLUMNS) + "\n")
@@ -237,6 +229,7 @@ def _write_trace(name: str, result: RunResult) -> None:
 
 
 def _print_list(configuration: Configuration) -> None:
+    print("instrument:")
     for name in names():
         one = experiment(name, configuration)
         print(f"{name:<20} {one.duration_s:6.1f} s   {one.title}")

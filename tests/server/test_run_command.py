@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from hardware.kinematic_plant import KinematicPlant
 from hardware.plant import Measurement
 from scenes.experiments import experiment, names
+from scenes.experiments.tubes import TITLES
 from server.command_line import main
 from server.configuration_file import load
 from server.run import headless as headless_run
@@ -154,7 +155,8 @@ def test_equal_runs_leave_equal_traces(tmp_path: Path, short: str) -> None:
 def test_the_list_has_every_experiment(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "--list"]) == 0
     listed = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in listed] == list(names())
+    expected = ["instrument:", *names(), "concentric:", *TITLES]
+    assert [line.split()[0] for line in listed] == expected
 
 
 def test_all_runs_every_experiment_for_every_case_it_lists(

@@ -1,6 +1,9 @@
 """SNSQP: saturation in the null space as one quadratic program for each task, eq. (8).
 
-With 0 ≤ s_k ≤ 1, which the print leaves out: without it a task may run backward or too fast.
+With 0 ≤ s_k ≤ 1, which the print leaves out: without it a task may run backward or too fast. And
+where the second program has no solution, because the first task at its fastest drags A aside, the
+first one's rates stand (s_2 = 0), as in the algorithm that (8) comes from (the paper's reference
+12).
 """
 
 from __future__ import annotations
@@ -53,10 +56,15 @@ class Snsqp:
         for bound in bounds:
             bound[count + 1 : count + 4] = problem.relative_jacobian @ first[:count]
         second, solution = self._solve(6)
+        if solution == Solution.INFEASIBLE:
+            problem.rates[:] = first[:count]
+            problem.scales[:] = first[count], 0.0
+            return Solution.SOLVED
         if solution != Solution.SOLVED:
             return self._give_up(problem, solution)
         problem.rates[:] = second[:count]
         problem.scales[:] = first[count], second[count]
+        np.clip(problem.scales, 0.0, 1.0, out=problem.scales)  # the tolerance
         return Solution.SOLVED
 
     def _solve(self, rows: int) -> tuple[np.ndarray, Solution]:
