@@ -17,7 +17,7 @@ from scipy.optimize import root
 
 from benchmarks.tick import percentiles
 from robot.concentric.kinematics import SOLVED, solve_arm
-from robot.concentric.stability import BranchFollower
+from robot.concentric.stability import BranchFollower, TubesSnap
 from robot.concentric.tubes import tube_array
 from robot.configuration import Configuration
 
@@ -110,7 +110,7 @@ def _alternate(tubes: np.ndarray, overlap: float, ticks: int, turns: int) -> dic
         )
         ended = time.perf_counter_ns()
         if status != SOLVED:
-            raise RuntimeError(f"the arm is not solved at tick {index}: status {status}")
+            raise TubesSnap(q)
         if index < _WARM_UP:
             continue
         ours.append(ended - began)

@@ -18,8 +18,9 @@ from robot.concentric.vectors import add_to_column, column, combine, cross
 
 POINTS = 4
 
-STEP_TURN = 0.3
-"""Longest step, as a phase (rad) of the fastest motion that tubes can make in the section."""
+STEP_TURN = 0.6
+"""Longest step, as a phase (rad) of the fastest motion that tubes can make in the section. With
+four points the tip is then within 1e-9 mm of where ten times finer steps have it."""
 
 _SETTLED = 1e-14
 _MOST_ITERATIONS = 40

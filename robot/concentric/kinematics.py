@@ -262,7 +262,7 @@ def solve_arm(
         torsion_change: (n, 2n) filled with their derivative by q: torsion + torsion_change @ dq is
             the guess for q + dq.
         stability: (1,) filled with the stability determinant, see
-            :mod:`robot.concentric.stability`.
+            :mod:`robot.concentric.stability`; below 0 the solution is one that tubes leave.
 
     Returns:
         ``SOLVED``, or why not; everything is NaN then.
