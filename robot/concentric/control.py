@@ -19,15 +19,22 @@ from robot.concentric.methods.choice import Method, method_named
 from robot.concentric.methods.rate_problem import RateProblem, Solution
 from robot.concentric.pair import ArmPair, PairKinematics
 from robot.concentric.proximal import Proximal, settle_inside
+from robot.concentric.stability_slope import stability_slope
 
 CORRECTIONS = 3
-"""How often a step that curvature bends away is linearised anew, for methods that do so."""
+"""How often a step that curvature bends away is linearised anew, by methods that do so."""
 SHARES = 5
 """How many shares of such a step are tried, each half of the one before."""
 RELATIVE_CLOSE = 2e-6
 """Relative error that a step may add without another correction, m."""
 RELATIVE_ALLOWED = 2e-5
 """Relative error beyond which a step is halved, m."""
+STABILITY_NEAR = 0.4
+"""Stability determinant below which hqp watches how it falls."""
+STABILITY_KEPT = 1.2
+"""How many times the margin the determinant is kept at; the line of its slope lies above it."""
+_STABILITY_SHARE = 0.5
+"""How much of what is left to that may fall in an iteration."""
 _TOUCH = 1e-9
 
 
@@ -40,7 +47,10 @@ class ControlStatus(IntEnum):
     NOT_FINITE = 3
     UNSTABLE = 4
     SOLVER_FAILED = 5
+    DRIFTING = 6
 
+
+_NOT_CONVERGED = ControlStatus.NOT_CONVERGED
 
 REASONS: dict[ControlStatus, str] = {
     ControlStatus.SOLVED: "moved",
@@ -49,6 +59,7 @@ REASONS: dict[ControlStatus, str] = {
     ControlStatus.NOT_FINITE: "a number is not finite",
     ControlStatus.UNSTABLE: "the tubes are about to snap",
     ControlStatus.SOLVER_FAILED: "the solver goes in circles",
+    ControlStatus.DRIFTING: "no step toward the target keeps the relative position",
 }
 """The status in words."""
 
@@ -69,7 +80,7 @@ class ControlReport:
         bound_violation: largest violation of (1) with its margins after the step, m.
         peak_rotation: fastest rotation of a tube, rad/s.
         peak_translation: fastest translation, m/s.
-        corrections: how often the kinematics were evaluated again within the step.
+        evaluations: how often the kinematics of both arms were evaluated.
     """
 
     def __init__(self, tubes: int) -> None:
@@ -82,7 +93,7 @@ class ControlReport:
         self.bound_violation = 0.0
         self.peak_rotation = 0.0
         self.peak_translation = 0.0
-        self.corrections = 0
+        self.evaluations = 0
 
 
 class PairControl:
@@ -163,7 +174,7 @@ class PairControl:
         problem.tracking_velocity += feed_forward
         problem.scales[:] = 1.0
         problem.preferred[:] = 0.0
-        report.corrections = 0
+        report.evaluations = 0
         if not (
             _finite(problem.relative_velocity, problem.tracking_velocity)
             and _finite(now.q, now.torsion)
@@ -171,8 +182,26 @@ class PairControl:
             return ControlStatus.NOT_FINITE
         problem.stand_at(now.q)
         self._linearise(now)
+        if self._method.corrects:
+            self._watch_stability(now)
         self._relative_target[:] = now.relative + self.period * problem.relative_velocity
         return self._solve()
+
+    def _watch_stability(self, now: PairKinematics) -> None:
+        """How fast the determinants may fall, where an arm comes near snapping."""
+        n, problem = self.pair.count, self._problem
+        for arm in range(2):
+            left = now.stability[arm] - STABILITY_KEPT * self._margin
+            problem.stability_fall[arm] = np.inf
+            if now.stability[arm] < STABILITY_NEAR:
+                problem.stability_fall[arm] = _STABILITY_SHARE * max(left, 0.0) / self.period
+                stability_slope(
+                    now.q[2 * n * arm : 2 * n * (arm + 1)],
+                    now.torsion[n * arm : n * (arm + 1)],
+                    now.torsion_change[arm],
+                    self.pair.tubes,
+                    problem.stability_slope[arm],
+                )
 
     def _linearise(self, at: PairKinematics) -> None:
         self._problem.relative_jacobian[:] = at.relative_jacobian
@@ -195,14 +224,26 @@ class PairControl:
         after: PairKinematics,
         report: ControlReport,
     ) -> ControlStatus:
-        """Integrate; refuse what does not converge or snaps."""
-        if self._method.corrects:
-            status = self._move_closely(now, relative, after, report)
-        else:
-            solved = self._try(now, after)
-            status = ControlStatus.SOLVED if solved else ControlStatus.NOT_CONVERGED
-        if status != ControlStatus.SOLVED:
-            return status
+        """Integrate; refuse what does not converge or snaps.
+
+        A method that corrects takes back what curvature adds to the relative error. Where limits or
+        a singular pose leave no way to do so, a share of the step is made: what curvature adds goes
+        with the square of the share.
+        """
+        if not self._method.corrects:
+            return self._checked(now, after) if self._try(now, after) else _NOT_CONVERGED
+        share, status = 1.0, _NOT_CONVERGED
+        self._asked[:] = self._problem.rates
+        for _ in range(SHARES):
+            np.multiply(self._asked, share, out=self._problem.rates)
+            status = self._move_closely(now, relative, after, report, share)
+            if status == ControlStatus.SOLVED:
+                break
+            share *= 0.5
+        return status
+
+    def _checked(self, now: PairKinematics, after: PairKinematics) -> ControlStatus:
+        """``UNSTABLE`` where an arm comes nearer to snapping than the margin."""
         for arm in range(2):
             if after.stability[arm] < min(self._margin, now.stability[arm]):
                 return ControlStatus.UNSTABLE
@@ -214,33 +255,25 @@ class PairControl:
         relative: np.ndarray,
         after: PairKinematics,
         report: ControlReport,
+        share: float,
     ) -> ControlStatus:
-        """Integrate and take back what curvature adds to the relative error.
-
-        Where limits or a singular pose leave no way to take it back, a share of the step is made:
-        what curvature adds goes with the square of the share.
-        """
-        problem, share = self._problem, 1.0
-        self._asked[:] = problem.rates
+        """Integrate and correct; ``DRIFTING`` where the relative error cannot be taken back."""
         before = math.sqrt(float(report.relative_before @ report.relative_before))
-        status = ControlStatus.NOT_CONVERGED
-        for _ in range(SHARES):
-            np.multiply(self._asked, share, out=problem.rates)
-            for correction in range(CORRECTIONS + 1):
-                report.corrections += 1
-                if not self._try(now, after):
-                    status = ControlStatus.NOT_CONVERGED
-                    break
-                status = ControlStatus.SOLVED
-                off = _distance(relative, after.relative)
-                if off <= max(RELATIVE_CLOSE, (1.0 - 0.5 * share * self._taken_back) * before):
-                    return status
-                if correction < CORRECTIONS and self._correct(now, after, share) != status:
-                    break
-            if status == ControlStatus.SOLVED and off <= max(RELATIVE_ALLOWED, before):
+        aim = max(RELATIVE_CLOSE, (1.0 - 0.5 * share * self._taken_back) * before)
+        off = math.inf
+        for correction in range(CORRECTIONS + 1):
+            report.evaluations += 1
+            if not self._try(now, after):
+                return ControlStatus.NOT_CONVERGED
+            off = _distance(relative, after.relative)
+            if off <= aim or correction == CORRECTIONS:
+                break
+            status = self._correct(now, after, share)
+            if status != ControlStatus.SOLVED:
                 return status
-            share *= 0.5
-        return status
+        if off > max(RELATIVE_ALLOWED, before):
+            return ControlStatus.DRIFTING
+        return self._checked(now, after)
 
     def _correct(self, now: PairKinematics, after: PairKinematics, share: float) -> ControlStatus:
         """Rates near by, linearised at the end of the step, within the limits of its beginning."""

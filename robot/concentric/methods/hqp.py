@@ -1,7 +1,8 @@
 """hqp: a hierarchy of least-squares levels under all limits, by the first robot's solver.
 
 Limits stand above every level: speeds, (1) as rows that couple neighbouring tubes, all with
-braking, so that standing still is always allowed. Then, level by level: the relative position, the
+braking, and near snapping how fast the stability determinants may fall; standing still is always
+allowed. Then, level by level: the relative position, the
 tracking of A, and the least motion.
 """
 
@@ -10,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from robot.compiled import compiled
-from robot.concentric.methods.rate_problem import RateProblem, Solution
+from robot.concentric.methods.rate_problem import UNBOUNDED, RateProblem, Solution
 from robot.concentric.proximal import braking_rate
 from robot.priority.levels import Plan, equalize
 from robot.priority.lexicographic import LexicographicProblem
@@ -52,24 +53,25 @@ class Hqp:
     def __init__(self, problem: RateProblem) -> None:
         n = problem.tubes
         unknowns, self._gaps = 4 * n, 2 * (n - 1)
+        self._limits = self._gaps + 2
         self._unit = np.zeros(unknowns)
         self._unit[problem.translations] = problem.proximal.speed
         self._unit[problem.rotations] = problem.rotation_speed
-        size = unknowns + self._gaps + 6
-        self._matrix = np.zeros((self._gaps + 6, unknowns))
+        size = unknowns + self._limits + 6
+        self._matrix = np.zeros((self._limits + 6, unknowns))
         self._lower, self._upper = np.full(size, -1.0), np.full(size, 1.0)
         for arm in range(2):
             gaps = slice((n - 1) * arm, (n - 1) * (arm + 1))
             self._matrix[gaps, 2 * n * arm : 2 * n * (arm + 1)] = problem.proximal.rows()
         self._preferred = np.zeros(unknowns)
         self._solver = LexicographicProblem(
-            _LEVELS, self._matrix, self._upper, self._lower, self._gaps
+            _LEVELS, self._matrix, self._upper, self._lower, self._limits
         )
 
     def solve(self, problem: RateProblem) -> Solution:
         """Fill the problem's rates; zero where the solver fails, which it must not."""
         count, speed = len(problem.rates), problem.proximal.speed
-        lower, upper, levels = self._lower, self._upper, self._matrix[self._gaps :]
+        lower, upper, levels = self._lower, self._upper, self._matrix[self._limits :]
         _box(
             problem.beta,
             problem.proximal.lower,
@@ -82,13 +84,14 @@ class Hqp:
         )
         lower[count : count + self._gaps] = problem.gap_lower / speed
         upper[count : count + self._gaps] = problem.gap_upper / speed
+        self._keep_stable(problem)
         np.multiply(problem.relative_jacobian, self._unit, out=levels[:3])
         np.multiply(problem.tracking_jacobian, self._unit, out=levels[3:])
-        wanted = upper[count + self._gaps :]
+        wanted = upper[count + self._limits :]
         wanted[:3], wanted[3:] = problem.relative_velocity, problem.tracking_velocity
         equalize(levels[:3], wanted[:3])
         equalize(levels[3:], wanted[3:])
-        lower[count + self._gaps :] = wanted
+        lower[count + self._limits :] = wanted
         np.divide(problem.preferred, self._unit, out=self._preferred)
         shares, flag = self._solver.solve(self._preferred, problem.damping)
         if flag <= 0:
@@ -97,3 +100,17 @@ class Hqp:
         np.clip(shares, lower[:count], upper[:count], out=problem.rates)  # the tolerance
         problem.rates *= self._unit
         return Solution.SOLVED
+
+    def _keep_stable(self, problem: RateProblem) -> None:
+        """The rows of the stability determinants; unbounded where an arm is far from snapping."""
+        half = len(problem.rates) // 2
+        for arm in range(2):
+            row, place = self._matrix[self._gaps + arm], len(problem.rates) + self._gaps + arm
+            row[:] = 0.0
+            row[half * arm] = 1.0
+            self._lower[place], self._upper[place] = -UNBOUNDED, UNBOUNDED
+            fall = problem.stability_fall[arm]
+            if np.isfinite(fall):
+                own = slice(half * arm, half * (arm + 1))
+                np.multiply(problem.stability_slope[arm], self._unit[own], out=row[own])
+                self._lower[place] = -fall

@@ -43,6 +43,9 @@ class RateProblem:
         box_upper: (4n,) Q̇_max.
         gap_lower: (2(n − 1),) bounds of the rates of the gaps between neighbours, A then B, m/s.
         gap_upper: (2(n − 1),).
+        stability_slope: (2, 2n) derivative of each arm's stability determinant by its q.
+        stability_fall: (2,) how fast hqp may let it fall, 1/s; infinite far from snapping, where
+            the slope is of no use.
         preferred: (4n,) rates that hqp takes where its levels leave freedom.
         damping: of the levels of hqp.
         rates: (4n,) the answer.
@@ -62,6 +65,8 @@ class RateProblem:
         self.box_lower = np.full(4 * n, -UNBOUNDED)
         self.box_upper = np.full(4 * n, UNBOUNDED)
         self.gap_lower, self.gap_upper = np.zeros(2 * (n - 1)), np.zeros(2 * (n - 1))
+        self.stability_slope = np.zeros((2, 2 * n))
+        self.stability_fall = np.full(2, np.inf)
         self.preferred, self.damping = np.zeros(4 * n), 0.0
         self.rates, self.scales = np.zeros(4 * n), np.ones(2)
 
