@@ -35,6 +35,8 @@ STABILITY_KEPT = 1.2
 """How many times the margin the determinant is kept at; the line of its slope lies above it."""
 _STABILITY_SHARE = 0.5
 """How much of what is left to that may fall in an iteration."""
+_MOVING = 1e-4
+"""Step of A, m, from which on a determinant below what is kept has to rise."""
 _TOUCH = 1e-9
 
 
@@ -188,20 +190,32 @@ class PairControl:
         return self._solve()
 
     def _watch_stability(self, now: PairKinematics) -> None:
-        """How fast the determinants may fall, where an arm comes near snapping."""
+        """How fast the determinants may fall, where an arm comes near snapping.
+
+        Below what is kept they have to rise while A moves, or each step along the boundary would
+        lose a little by its curvature. Half of what the rotations alone can do is asked at most, so
+        that there are always rates that do; where A is not to move, none have to.
+        """
         n, problem = self.pair.count, self._problem
+        pace = self.period * math.sqrt(float(problem.tracking_velocity @ problem.tracking_velocity))
         for arm in range(2):
-            left = now.stability[arm] - STABILITY_KEPT * self._margin
-            problem.stability_fall[arm] = np.inf
-            if now.stability[arm] < STABILITY_NEAR:
-                problem.stability_fall[arm] = _STABILITY_SHARE * max(left, 0.0) / self.period
-                stability_slope(
-                    now.q[2 * n * arm : 2 * n * (arm + 1)],
-                    now.torsion[n * arm : n * (arm + 1)],
-                    now.torsion_change[arm],
-                    self.pair.tubes,
-                    problem.stability_slope[arm],
-                )
+            problem.stability_fall[arm] = math.inf
+            if now.stability[arm] >= STABILITY_NEAR:
+                continue
+            slope = problem.stability_slope[arm]
+            stability_slope(
+                now.q[2 * n * arm : 2 * n * (arm + 1)],
+                now.torsion[n * arm : n * (arm + 1)],
+                now.torsion_change[arm],
+                self.pair.tubes,
+                slope,
+            )
+            left = float(now.stability[arm]) - STABILITY_KEPT * self._margin
+            fall = _STABILITY_SHARE * left / self.period
+            if fall < 0.0:
+                able = 0.5 * problem.rotation_speed * float(np.abs(slope[n:]).sum())
+                fall = max(fall * min(pace / _MOVING, 1.0), -able)
+            problem.stability_fall[arm] = fall
 
     def _linearise(self, at: PairKinematics) -> None:
         self._problem.relative_jacobian[:] = at.relative_jacobian

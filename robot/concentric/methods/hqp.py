@@ -1,8 +1,8 @@
 """hqp: a hierarchy of least-squares levels under all limits, by the first robot's solver.
 
 Limits stand above every level: speeds, (1) as rows that couple neighbouring tubes, all with
-braking, and near snapping how fast the stability determinants may fall; standing still is always
-allowed. Then, level by level: the relative position, the
+braking, so that standing still is always allowed, and near snapping how fast the stability
+determinants may fall. Then, level by level: the relative position, the
 tracking of A, and the least motion.
 """
 

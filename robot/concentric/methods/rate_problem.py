@@ -44,8 +44,8 @@ class RateProblem:
         gap_lower: (2(n − 1),) bounds of the rates of the gaps between neighbours, A then B, m/s.
         gap_upper: (2(n − 1),).
         stability_slope: (2, 2n) derivative of each arm's stability determinant by its q.
-        stability_fall: (2,) how fast hqp may let it fall, 1/s; infinite far from snapping, where
-            the slope is of no use.
+        stability_fall: (2,) how fast hqp may let it fall, 1/s; below 0 it has to rise; infinite far
+            from snapping, where the slope is of no use.
         preferred: (4n,) rates that hqp takes where its levels leave freedom.
         damping: of the levels of hqp.
         rates: (4n,) the answer.
