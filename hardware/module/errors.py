@@ -69,6 +69,24 @@ class NeverTaut(ModuleError):
         self.travel_deg = travel_deg
 
 
+class NeverLoose(ModuleError):
+    """A tendon stays under load although it was let out by the whole homing range.
+
+    Attributes:
+        travel_deg: how far it was let out.
+    """
+
+    code = "tendon_never_loose"
+
+    def __init__(self, servos: Sequence[int], travel_deg: float) -> None:
+        super().__init__(
+            servos,
+            f"still under load after {travel_deg:.0f} deg were let out: the tendon is wound up too "
+            "far or caught; let it out by hand",
+        )
+        self.travel_deg = travel_deg
+
+
 class WrongDirection(ModuleError):
     """A servo becomes taut when it turns the other way than configured."""
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Sequence
 
-from hardware.module.errors import NeverTaut, WrongDirection, WrongTendon
+from hardware.module.errors import NeverLoose, NeverTaut, WrongDirection, WrongTendon
 from hardware.module.transmission import Transmission
 from hardware.servos.control_table import TABLE
 from robot.configuration import Servos
@@ -21,7 +21,7 @@ from robot.records import SERVOS
 _SURE = 3
 """Readings in a row that make a load certain."""
 _PAY_OUT_DEG = 60.0
-"""How far tendons are let out at most until they are loose."""
+"""After so much a tendon that is let out must bear less than before; at the homing range, none."""
 _TEST_LOAD = 0.05
 """How much more one servo is loaded to see who answers: friction in the gears hides less."""
 _ANSWERS = 0.3
@@ -82,6 +82,7 @@ class Homing:
 
         Raises:
             NeverTaut: if a tendon is too slack, or torn.
+            NeverLoose: if a tendon stays under load although it is let out.
             WrongDirection: if a servo turns the other way than configured.
             WrongTendon: if the servos' order is not that of the tendons.
         """
@@ -133,7 +134,8 @@ class Homing:
                 worst = max(tight, key=lambda index: abs(self._pull[index]))
                 if abs(self._pull[worst]) > abs(before[worst]):
                     raise WrongDirection(self._ids[worst], self._directions[worst])
-                raise NeverTaut([self._ids[worst]], 0.0)
+                if travel > self._range:
+                    raise NeverLoose([self._ids[worst]], self._range / self._ticks_per_deg)
             if tight:
                 # All alike, which keeps straight what is straight.
                 for index in range(SERVOS):
