@@ -20,7 +20,7 @@ from robot.instrument_robot import InstrumentRobot
 from robot.records import Request
 from scenes.boards.board import board
 from scenes.experiments import experiment
-from server.control.loop import ControlLoop
+from server.control.instrument_loop import InstrumentLoop
 
 EXPERIMENTS = ("circle", "silicon-sine", "ring-board")
 _WARM_UP = 250
@@ -33,7 +33,7 @@ def _one(configuration: Configuration, name: str, seconds: float) -> dict[str, A
     robot = InstrumentRobot(configuration)
     x = robot.initial_state()["x"][0]
     plant = PhysicsPlant(configuration, x, board(chosen.board, configuration))
-    loop = ControlLoop(robot, plant, configuration)
+    loop = InstrumentLoop(robot, plant, configuration)
     bare, steps = plant.engine()
     loop.hold = 1
     for _ in range(_WARM_UP):

@@ -29,7 +29,7 @@ from robot.priority.lexicographic import LexicographicProblem
 from robot.records import OUTCOME, Request
 from robot.urdf import urdf_text
 from scenes.experiments import experiment
-from server.control.loop import ControlLoop
+from server.control.instrument_loop import InstrumentLoop
 
 _WARM_UP = 500
 
@@ -46,7 +46,7 @@ def _recorded_inputs(
     """States (n,) and inputs (n,) of the first ticks of an experiment, to feed the tick again."""
     robot = InstrumentRobot(configuration)
     x = robot.initial_state()["x"][0]
-    loop = ControlLoop(robot, KinematicPlant(configuration, x), configuration)
+    loop = InstrumentLoop(robot, KinematicPlant(configuration, x), configuration)
     loop.request = Request.ENABLE
     loop.step()
     loop.start_path(experiment(name, configuration).path)

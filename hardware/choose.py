@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hardware.arm.device import ArmDevice
-from hardware.faulty_plant import FaultyPlant
+from hardware.faulty_plant import FaultyPlant, plant_faults
 from hardware.kinematic_plant import KinematicPlant
 from hardware.physics.plant import PhysicsPlant
 from hardware.plant import Plant
@@ -35,6 +35,13 @@ def simulated_plant(configuration: Configuration, x: np.ndarray) -> Plant:
     if simulation.plant == "kinematic":
         return KinematicPlant(configuration, x)
     return PhysicsPlant(configuration, x, board(simulation.board, configuration))
+
+
+def breakable_tubes(configuration: Configuration, q: np.ndarray) -> Plant:
+    """Simulated concentric-tube arms that stand at ``q`` (4n,) and may be broken on request."""
+    from hardware.tube_plant import TubePlant
+
+    return FaultyPlant(TubePlant(configuration, q), plant_faults("concentric"))
 
 
 def breakable_plant(configuration: Configuration, x: np.ndarray) -> Plant:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from hardware.plant import Measurement, Plant, PlantSpec
 from robot.errors import UnknownName
-from robot.records import ARM_JOINTS, COMMAND, SERVOS, Readiness
+from robot.records import Readiness
 from robot.safety import Event
 from scenes.boards.board import Board
 
@@ -37,7 +38,7 @@ class PlantFault:
         readiness: likewise.
         contact_n: force that the scene's sensor reads on top of what there is, N.
         offset_joint: the joint whose measurement is off by ``offset_rad``.
-        offset_rad: by how much, rad; NaN for no number at all.
+        offset_rad: by how much, rad (a tube's translation: m); NaN for no number at all.
         stuck_joint: the joint that stays where it is, whatever it is told.
         stuck_servo: likewise among the servos.
         late_s: how much too late the next tick begins, s; once.
@@ -96,7 +97,27 @@ FAULTS: dict[str, PlantFault] = {
     "arm-error": PlantFault("The arm reports an error", event=Event.ARM_FAULT, readiness=_BROKEN),
     "picture-impossible": PlantFault("The picture cannot be drawn", shows_nothing=True),
 }
-"""What can be injected into a simulated robot, by name."""
+"""What can be injected into the simulated instrument, by name."""
+
+_WITH_TUBES = ("measurement-lost", "measurement-silent", "late-tick", "plant-exception",
+               "simulation-broken", "picture-impossible")  # fmt: skip
+
+TUBE_FAULTS: dict[str, PlantFault] = {
+    **{name: FAULTS[name] for name in _WITH_TUBES},
+    "measurement-nan": PlantFault(
+        "A tube is measured as no number", offset_joint=0, offset_rad=math.nan
+    ),
+    "tube-stuck": PlantFault("Arm A's innermost tube is stuck", stuck_joint=0),
+    "encoder-jump": PlantFault(
+        "The encoder of arm A's innermost tube jumps by 10 mm", offset_joint=0, offset_rad=0.01
+    ),
+}
+"""What can be injected into simulated concentric-tube arms."""
+
+
+def plant_faults(robot: str) -> dict[str, PlantFault]:
+    """What can be injected into the simulated robot of that name."""
+    return TUBE_FAULTS if robot == "concentric" else FAULTS
 
 
 class FaultyPlant:
@@ -104,20 +125,23 @@ class FaultyPlant:
 
     Args:
         plant: the simulated robot.
+        faults: what can be injected into it, by name.
 
     Attributes:
         spec: of the wrapped plant.
+        faults: the same.
         active: name of the fault that acts now; empty for none.
     """
 
-    def __init__(self, plant: Plant) -> None:
-        self._plant = plant
+    def __init__(self, plant: Plant, faults: Mapping[str, PlantFault] = FAULTS) -> None:
+        self._plant, self.faults = plant, faults
         self.spec: PlantSpec = plant.spec
         self.active = ""
         self._fault: PlantFault | None = None
-        self._q, self._servo = np.zeros(ARM_JOINTS), np.zeros(SERVOS)
-        self._held_q, self._held_servo = np.zeros(ARM_JOINTS), np.zeros(SERVOS)
-        self._command = np.zeros(1, COMMAND)
+        measured = plant.read()
+        self._q, self._servo = measured.q.copy(), measured.servo.copy()
+        self._held_q, self._held_servo = self._q.copy(), self._servo.copy()
+        self._command: np.ndarray | None = None
         self._age_s, self._late_s = 0.0, 0.0
 
     def inject(self, name: str) -> None:
@@ -126,11 +150,11 @@ class FaultyPlant:
         Raises:
             UnknownName: there is no such fault.
         """
-        if name not in FAULTS:
-            raise UnknownName("fault", name, tuple(FAULTS))
+        if name not in self.faults:
+            raise UnknownName("fault", name, tuple(self.faults))
         measured = self._plant.read()
         self._held_q[:], self._held_servo[:] = measured.q, measured.servo
-        self.active, self._fault = name, FAULTS[name]
+        self.active, self._fault = name, self.faults[name]
         self._age_s, self._late_s = 0.0, self._fault.late_s
 
     def clear(self) -> None:
@@ -165,6 +189,8 @@ class FaultyPlant:
         if fault is None or (fault.stuck_joint == _NOBODY and fault.stuck_servo == _NOBODY):
             self._plant.write(command)
             return
+        if self._command is None:
+            self._command = command.copy()
         self._command[:] = command
         if fault.stuck_joint != _NOBODY:
             self._command["q"][0, fault.stuck_joint] = self._held_q[fault.stuck_joint]

@@ -15,8 +15,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
-from robot.configuration import Section
 from robot.errors import KeyholeError
+from robot.section import Section
 
 Gain = Annotated[float, Field(ge=0.3, le=1.5, allow_inf_nan=False)]
 Small = Annotated[float, Field(ge=-0.5, le=0.5, allow_inf_nan=False)]

@@ -7,47 +7,32 @@ The models mirror ``keyhole.toml`` beside this module. They read no files themse
 from __future__ import annotations
 
 import hashlib
-import math
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
+from robot.concentric.design import Concentric
 from robot.errors import ConfigurationError
+from robot.section import (
+    Direction,
+    Finite,
+    Length,
+    NotNegative,
+    Percent,
+    Positive,
+    Section,
+    Vector,
+    unit,
+)
 
 SCHEMA_VERSION = 1
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Length = Annotated[float, Field(gt=0, le=2, allow_inf_nan=False)]
-Vector = tuple[Finite, Finite, Finite]
-Percent = Annotated[float, Field(gt=0, le=100)]
+RobotName = Literal["instrument", "concentric"]
 ServoId = Annotated[int, Field(ge=0, le=252)]
 Sign = Literal[-1, 1]
 DriveName = Literal["both", "arm", "segment", "none"]
 BreathingAmplitude = Annotated[float, Field(ge=0, le=10, allow_inf_nan=False)]
 BreathingPeriod = Annotated[float, Field(ge=1, le=20, allow_inf_nan=False)]
-
-
-def _unit(value: Vector) -> Vector:
-    norm = math.sqrt(sum(x * x for x in value))
-    if norm < 1e-6:
-        raise ValueError("a direction must not be zero")
-    return (value[0] / norm, value[1] / norm, value[2] / norm)
-
-
-def _not_zero(value: Vector) -> Vector:
-    _unit(value)
-    return value
-
-
-Direction = Annotated[Vector, AfterValidator(_not_zero)]
-
-
-class Section(BaseModel):
-    """A table of the configuration: unknown keys are refused, values cannot be changed later."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=False)
 
 
 class Trocar(Section):
@@ -72,7 +57,7 @@ class Start(Section):
 
     @model_validator(mode="after")
     def _up_is_not_along_the_shaft(self) -> Start:
-        shaft, up = _unit(self.shaft_direction), _unit(self.bend_direction_up)
+        shaft, up = unit(self.shaft_direction), unit(self.bend_direction_up)
         if abs(sum(a * b for a, b in zip(shaft, up, strict=True))) > 0.999:
             raise ValueError("bend_direction_up must not point along shaft_direction")
         return self
@@ -113,7 +98,7 @@ class Module(Section):
 
     @model_validator(mode="after")
     def _directions_are_perpendicular(self) -> Module:
-        shaft, bend = _unit(self.shaft_direction), _unit(self.bend_direction)
+        shaft, bend = unit(self.shaft_direction), unit(self.bend_direction)
         if abs(sum(a * b for a, b in zip(shaft, bend, strict=True))) > 1e-9:
             raise ValueError("bend_direction must be perpendicular to shaft_direction")
         return self
@@ -352,6 +337,7 @@ class Configuration(Section):
     """Everything that describes one Keyhole."""
 
     schema_version: Literal[1]
+    robot: RobotName
     trocar: Trocar
     start: Start
     instrument: Instrument
@@ -369,6 +355,7 @@ class Configuration(Section):
     stylus: Stylus
     server: Server
     arm: Arm
+    concentric: Concentric
 
     @model_validator(mode="after")
     def _start_inside_the_limits(self) -> Configuration:
@@ -377,6 +364,16 @@ class Configuration(Section):
         if not self.limits.lambda_min < self.start.lambda_along_shaft < self.limits.lambda_max:
             raise ValueError("start.lambda_along_shaft must lie between the lambda limits")
         return self
+
+    @property
+    def rate_hz(self) -> float:
+        """Rate of the control loop of the robot that this configuration chooses, Hz."""
+        return self.concentric.rate_hz if self.robot == "concentric" else self.control.rate_hz
+
+    @property
+    def drives_hardware(self) -> bool:
+        """Whether parts of the chosen robot are real; concentric-tube arms are always simulated."""
+        return self.hardware.connected and self.robot == "instrument"
 
     def hash64(self) -> int:
         """First 63 bits of the SHA-256 of the canonical JSON: the mark every record carries."""

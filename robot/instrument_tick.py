@@ -11,12 +11,13 @@ from robot.commands import tip_twist
 from robot.compensation import SHARE_RATE, commanded_bend, follow_friction, follow_setting
 from robot.compiled import compiled
 from robot.instrument import project_on_shaft, rcm_jacobian, shaft, tip, tip_jacobian
+from robot.instrument_safety import decide
 from robot.priority.levels import assemble
 from robot.priority.limits import active_limits, lock_arm, lock_segment, rate_limits
 from robot.priority.meet_all import meet_all
 from robot.records import Case, DriveMode, LeaderKind, Safety, Solver
 from robot.rotations import angle_between, quaternion_from_matrix
-from robot.safety import Event, apply_event, decide
+from robot.safety import Event, apply_event
 from robot.segment import polar
 from robot.sensing.tip_correction import aim, correct, expected_tip, follow_tip, start_correction
 from robot.teleoperation import follow

@@ -1,4 +1,4 @@
-"""What one tick takes and gives, as numpy record types.
+"""What one tick takes and gives, as numpy record types: what all robots share, the instrument's.
 
 Positions in metres and base frame, orientations as unit quaternions (w, x, y, z) or rotation
 matrices, angles in radians. Every field is eight bytes wide so that a record is a flat block of
@@ -11,14 +11,18 @@ integrates, *measured* comes from encoders, *true* is the simulator's own.
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 
 RecordFields: TypeAlias = Any
 """A record or part of one inside compiled code, where its fields are attributes."""
+
+Fields: TypeAlias = list[Any]
+"""Fields that the records of all robots begin with: compiled code that names only these serves
+every robot."""
 
 ARM_JOINTS = 7
 SERVOS = 4
@@ -136,26 +140,31 @@ class ErrorSource(IntEnum):
     MEASURED = 1
 
 
+SHARED_SETTINGS: Fields = [
+    ("alignment", "i8"),
+    ("hold_to_move", "i8"),
+    ("lock_rotation", "i8"),
+    ("lock_translation", "i8"),
+    ("motion_scale", "f8"),
+    ("rotation_base_leader", "f8", (3, 3)),
+]
+"""The operator's choices that every robot has. ``rotation_base_leader`` turns leader motion into
+the base frame."""
+
 SETTINGS = np.dtype(
     [
+        *SHARED_SETTINGS,
         ("case", "i8"),
         ("solver", "i8"),
         ("coordinates", "i8"),
         ("feed_forward", "i8"),
-        ("alignment", "i8"),
-        ("hold_to_move", "i8"),
-        ("lock_rotation", "i8"),
-        ("lock_translation", "i8"),
         ("lock_arm", "i8"),
         ("compensation", "i8"),
         ("use_tracker", "i8"),
-        ("motion_scale", "f8"),
         ("lambda_reference", "f8"),
-        ("rotation_base_leader", "f8", (3, 3)),
     ]
 )
-"""The operator's choices. ``rotation_base_leader`` turns leader motion into the base frame;
-``lock_arm``: the joints stand still and the segment alone follows."""
+"""Those of the instrument. ``lock_arm``: the joints stand still and the segment alone follows."""
 
 LEADER = np.dtype(
     [
@@ -187,90 +196,100 @@ TRACKER = np.dtype(
 """A tip pose from a tracker, base frame, as it was ``age_s`` ago; ``sequence`` grows with each new
 one, and is 0 while there is none."""
 
+SHARED_INPUT: Fields = [
+    ("dt_s", "f8"),
+    ("request", "i8"),
+    ("hold", "i8"),
+    ("measured_valid", "i8"),
+    ("measured_age_s", "f8"),
+    ("plant_event", "i8"),
+    ("readiness", "i8"),
+    ("late_s", "f8"),
+    ("trocar_position", "f8", 3),
+    ("leader", LEADER),
+]
+"""What a tick of every robot is told. ``plant_event``: the :class:`robot.safety.Event` that the
+plant tells now, 0 for none; ``readiness``: a :class:`Readiness`; ``late_s``: how long after its
+deadline the tick began; ``trocar_position``: where the robot enters the body."""
+
 INPUT = np.dtype(
     [
-        ("dt_s", "f8"),
-        ("request", "i8"),
-        ("hold", "i8"),
-        ("measured_valid", "i8"),
-        ("measured_age_s", "f8"),
+        *SHARED_INPUT,
         ("measured_q", "f8", ARM_JOINTS),
         ("measured_servo", "f8", SERVOS),
         ("measured_tension", "f8", SERVOS),
         ("measured_load", "f8", SERVOS),
         ("measured_contact", "f8"),
-        ("plant_event", "i8"),
-        ("readiness", "i8"),
-        ("late_s", "f8"),
         ("tracker", TRACKER),
-        ("trocar_position", "f8", 3),
         ("trocar_velocity", "f8", 3),
         ("settings", SETTINGS),
-        ("leader", LEADER),
     ]
 )
-
-"""What a tick is told. ``measured_tension`` in N; ``measured_load``: of each servo, share of its
+"""That of the instrument. ``measured_tension`` in N; ``measured_load``: of each servo, share of its
 largest, -1 to 1; ``measured_contact``: largest force in N on the instrument that a sensor of the
-scene reads, 0 without one; ``plant_event``: the :class:`robot.safety.Event` that the plant tells
-now, 0 for none; ``readiness``: a :class:`Readiness`; ``late_s``: how long after its deadline the
-tick began."""
+scene reads, 0 without one."""
+
+SHARED_STATE: Fields = [
+    ("tick", "i8"),
+    ("safety", "i8"),
+    ("reason", "i8"),
+    ("engaged", "i8"),
+    ("leader_kind", "i8"),
+    ("leader_sequence", "i8"),
+    ("leader_position", "f8", 3),
+    ("leader_rotation", "f8", (3, 3)),
+    ("tip_position", "f8", 3),
+    ("tip_rotation", "f8", (3, 3)),
+    ("desired_position", "f8", 3),
+    ("desired_rotation", "f8", (3, 3)),
+    ("desired_velocity", "f8", 3),
+    ("desired_angular_velocity", "f8", 3),
+    ("target_position", "f8", 3),
+    ("target_rotation", "f8", (3, 3)),
+    ("anchor_leader_position", "f8", 3),
+    ("anchor_leader_rotation", "f8", (3, 3)),
+    ("anchor_tip_position", "f8", 3),
+    ("anchor_tip_rotation", "f8", (3, 3)),
+    ("anchor_scale", "f8"),
+    ("anchor_lock_rotation", "i8"),
+    ("anchor_lock_translation", "i8"),
+    ("anchor_rotation_base_leader", "f8", (3, 3)),
+    ("correction_position", "f8", 3),
+    ("correction_rotation", "f8", 3),
+    ("mode", "i8"),
+]
+"""What every robot remembers: its safety, who leads, and the led tip. ``tip_*``: that tip as
+commanded, base frame; ``target_*``: where the leader wants it; ``desired_*velocity``: how the
+desired pose moved in the last tick (m/s, rad/s, base frame); ``correction_*``: what a tracker says
+that the commanded tip is off (m, rotation vector in rad, base frame), zero without one; ``mode``:
+the :class:`DriveMode` in force."""
 
 STATE = np.dtype(
     [
-        ("tick", "i8"),
-        ("safety", "i8"),
-        ("reason", "i8"),
-        ("engaged", "i8"),
-        ("leader_kind", "i8"),
-        ("leader_sequence", "i8"),
-        ("leader_position", "f8", 3),
-        ("leader_rotation", "f8", (3, 3)),
+        *SHARED_STATE,
         ("x", "f8", 10),
         ("arm_position", "f8", 3),
         ("arm_rotation", "f8", (3, 3)),
         ("arm_jacobian", "f8", (6, ARM_JOINTS)),
-        ("tip_position", "f8", 3),
-        ("tip_rotation", "f8", (3, 3)),
-        ("desired_position", "f8", 3),
-        ("desired_rotation", "f8", (3, 3)),
-        ("anchor_leader_position", "f8", 3),
-        ("anchor_leader_rotation", "f8", (3, 3)),
-        ("anchor_tip_position", "f8", 3),
-        ("anchor_tip_rotation", "f8", (3, 3)),
-        ("anchor_scale", "f8"),
-        ("anchor_lock_rotation", "i8"),
-        ("anchor_lock_translation", "i8"),
-        ("anchor_rotation_base_leader", "f8", (3, 3)),
         ("friction", "f8", SERVOS),
         ("compensation", "f8", 2),
         ("tracker_sequence", "i8"),
         ("lagged_position", "f8", 3),
         ("lagged_rotation", "f8", (3, 3)),
-        ("correction_position", "f8", 3),
-        ("correction_rotation", "f8", 3),
         ("contact_allowance", "f8"),
-        ("target_position", "f8", 3),
-        ("target_rotation", "f8", (3, 3)),
-        ("desired_velocity", "f8", 3),
-        ("desired_angular_velocity", "f8", 3),
-        ("mode", "i8"),
         ("clearance", "f8"),
         ("clearance_part", "i8"),
         ("clearance_allowance", "f8"),
         ("trocar_distance", "f8"),
     ]
 )
-"""Everything the robot remembers. ``x`` is the commanded configuration; the ``arm_*`` and ``tip_*``
-fields are its forward kinematics, kept so that each tick computes them once (``arm_jacobian``:
-rows linear then angular, of the point that coincides with the base origin, base frame).
+"""That of the instrument. ``x`` is the commanded configuration; the ``arm_*`` and ``tip_*`` fields
+are its forward kinematics, kept so that each tick computes them once (``arm_jacobian``: rows linear
+then angular, of the point that coincides with the base origin, base frame).
 ``friction``: of each tendon in the disks, share of full, -1 to 1;
 ``compensation``: shares of gain and friction that are made up for;
-``lagged_*``: the commanded tip as old as the tracker's samples; ``correction_*``: what the tracker
-says that the commanded tip is off (m, rotation vector in rad, base frame); ``contact_allowance``:
-the contact force in N above which motion pauses; ``target_*``: where the leader wants the tip;
-``desired_*velocity``: how the desired pose moved in the last tick (m/s, rad/s, base frame);
-``mode``: the :class:`DriveMode` in force; ``clearance``: smallest distance in m between arm, shaft
+``lagged_*``: the commanded tip as old as the tracker's samples; ``contact_allowance``: the contact
+force in N above which motion pauses; ``clearance``: smallest distance in m between arm, shaft
 and body wall where they were measured, of the pair ``clearance_part`` (see
 ``robot.clearance``); ``clearance_allowance``: the clearance below which motion pauses;
 ``trocar_distance``: of the measured shaft from the trocar, m."""
@@ -284,36 +303,50 @@ COMMAND = np.dtype(
 )
 """Joint and servo angles to go to; ``moving`` is 0 for a zero-motion command."""
 
+SHARED_REPORT: Fields = [
+    ("desired_position", "f8", 3),
+    ("desired_wxyz", "f8", 4),
+    ("commanded_position", "f8", 3),
+    ("commanded_wxyz", "f8", 4),
+    ("twist", "f8", 6),
+    ("limits_active", "i8"),
+    ("solver_status", "i8"),
+    ("target_refused", "i8"),
+]
+"""What every controller reports of the led tip. ``twist``: as commanded, linear and angular, m/s
+and rad/s; ``limits_active``: bits of the limits that held the
+motion back; ``target_refused``: a :class:`Refusal`."""
+
 REPORT = np.dtype(
     [
-        ("desired_position", "f8", 3),
-        ("desired_wxyz", "f8", 4),
-        ("commanded_position", "f8", 3),
-        ("commanded_wxyz", "f8", 4),
+        *SHARED_REPORT,
         ("x", "f8", 10),
         ("x_dot", "f8", 10),
         ("theta", "f8"),
         ("delta", "f8"),
-        ("twist", "f8", 6),
         ("residual_rcm", "f8"),
         ("residual_linear", "f8"),
         ("residual_angular", "f8"),
-        ("limits_active", "i8"),
-        ("solver_status", "i8"),
-        ("target_refused", "i8"),
     ]
 )
-"""What the controller did. ``twist``: commanded tip twist (linear, angular). ``residual_*``: norms
-of what each level could not do, m/s and rad/s. ``limits_active``: bits, see ``priority.limits``."""
+"""What the instrument's controller did. ``residual_*``: norms of what each level could not do, m/s
+and rad/s. ``limits_active``: see ``priority.limits``."""
 
 OUTCOME = np.dtype([("state", STATE), ("command", COMMAND), ("report", REPORT)])
 """What ``tick`` returns: the next state, the command, the report."""
 
+SHARED_TRUTH: Fields = [
+    ("source", "i8"),
+    ("position", "f8", 3),
+    ("wxyz", "f8", 4),
+    ("position_error", "f8"),
+]
+"""Where the led tip is: the simulator's truth, or the forward kinematics of what was measured
+(``source``, an :class:`ErrorSource`), and the error against it: desired minus it."""
+
 TRUTH = np.dtype(
     [
-        ("source", "i8"),
-        ("position", "f8", 3),
-        ("wxyz", "f8", 4),
+        *SHARED_TRUTH,
         ("shaft_base", "f8", 3),
         ("shaft_end", "f8", 3),
         ("q", "f8", ARM_JOINTS),
@@ -327,16 +360,14 @@ TRUTH = np.dtype(
         ("rings_touched", "i8"),
         ("ball_position", "f8", 3),
         ("ball_progress", "f8"),
-        ("position_error", "f8"),
         ("orientation_error", "f8"),
         ("rcm_error", "f8"),
     ]
 )
-"""Where the robot is: the simulator's truth, or the forward kinematics of what was measured
-(``source``, an :class:`ErrorSource`), and the errors against it: desired minus it.
-``trocar_position``: where the trocar is, against which the RCM error counts; ``tension`` in N;
-``contact_force``: largest contact force on the instrument in N; ``rings_*``: a bit for each ring of
-the board; ``ball_progress``: 0 at the groove's start, 1 at its end."""
+"""Where the instrument is. ``trocar_position``: where the trocar is, against which the RCM error
+counts; ``tension`` in N; ``contact_force``: largest contact force on the instrument in N;
+``rings_*``: a bit for each ring of the board; ``ball_progress``: 0 at the groove's start, 1 at its
+end."""
 
 HEADER = np.dtype(
     [
@@ -358,12 +389,33 @@ HEADER = np.dtype(
 """``time_ns`` is the plant's clock, ``stamp_ns`` the host's monotonic clock at publication,
 ``request_sequence`` the last request from outside that this tick had taken in."""
 
-RECORD = np.dtype(
-    [
-        ("header", HEADER),
-        ("input", INPUT),
-        ("outcome", OUTCOME),
-        ("truth", TRUTH),
-    ]
-)
+
+class RecordTypes(NamedTuple):
+    """The numpy types of one robot.
+
+    Attributes:
+        robot: its name.
+        settings: the operator's choices.
+        outcome: what a tick fills.
+        truth: where the robot is.
+        record: one tick: header, input, outcome, truth.
+    """
+
+    robot: str
+    settings: np.dtype[Any]
+    outcome: np.dtype[Any]
+    truth: np.dtype[Any]
+    record: np.dtype[Any]
+
+
+def record_types(robot: str, tick_input: Any, outcome: Any, truth: Any) -> RecordTypes:
+    """The types of a robot whose ticks take ``tick_input`` (with ``settings`` in it)."""
+    record = np.dtype(
+        [("header", HEADER), ("input", tick_input), ("outcome", outcome), ("truth", truth)]
+    )
+    return RecordTypes(robot, tick_input["settings"], outcome, truth, record)
+
+
+INSTRUMENT = record_types("instrument", INPUT, OUTCOME, TRUTH)
+RECORD = INSTRUMENT.record
 """One tick of the first robot (``instrument``)."""

@@ -1,22 +1,20 @@
 """The safety states: one printed table of transitions, applied at the start of every tick.
 
 It fails closed: what the table does not list is refused and changes nothing; leaving FAULT takes an
-explicit RESET and leads to DISABLED, never to motion.
+explicit RESET and leads to DISABLED, never to motion. What is here serves every robot; what only
+one of them can measure is watched in a module of its own beside it.
 """
 
 from __future__ import annotations
 
-import math
 from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
-from robot.compensation import commanded_bend, expected_bend, follow_setting
 from robot.compiled import compiled
 from robot.errors import KeyholeError
 from robot.records import RecordFields, Request, Safety
-from robot.tendons import bend_from_servos, servo_angles
 
 
 class Event(IntEnum):
@@ -47,6 +45,8 @@ class Event(IntEnum):
     CLEARANCE = 22
     TROCAR_LEFT = 23
     CONTROL_LATE = 24
+    NEAR_SNAPPING = 25
+    RELATIVE_ERROR = 26
 
 
 class Transition(NamedTuple):
@@ -107,6 +107,8 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition(_E, Event.CLEARANCE, _P),
     Transition(_E, Event.TROCAR_LEFT, _F),
     Transition(_E, Event.CONTROL_LATE, _P),
+    Transition(_E, Event.NEAR_SNAPPING, _P),
+    Transition(_E, Event.RELATIVE_ERROR, _P),
 )
 """Every transition there is. An event that is not listed for a state leaves the state as it is; if
 it was an operator's request, it is refused."""
@@ -170,6 +172,14 @@ REASONS: dict[Event, tuple[str, str]] = {
         "a tick of the control loop came much too late",
         "close what else works on this computer, then enable",
     ),
+    Event.NEAR_SNAPPING: (
+        "the tubes are about to snap",
+        "enable, then move back the way it came",
+    ),
+    Event.RELATIVE_ERROR: (
+        "arm B cannot keep its place beside arm A",
+        "enable, then move back or more slowly",
+    ),
 }
 """For each event that led into the present state: why, and what to do."""
 
@@ -229,20 +239,12 @@ def _table() -> np.ndarray:
 
 
 _TABLE = _table()
-_DISABLED, _ENABLED = int(_D), int(_E)
-_ENABLE = int(Event.ENABLE)
-_STALE, _LOST, _TRACKING = (
-    int(Event.LEADER_STALE),
-    int(Event.MEASUREMENT_LOST),
-    int(Event.TRACKING_ERROR),
-)
-_CONTACT = int(Event.CONTACT_FORCE)
+_DISABLED, _ENABLED, _PAUSED = int(_D), int(_E), int(_P)
+_ENABLE, _STALE = int(Event.ENABLE), int(Event.LEADER_STALE)
 _BUS_LOST, _ARM_LOST, _BACK = int(Event.BUS_LOST), int(Event.ARM_LOST), int(Event.DEVICES_BACK)
-_CLEARANCE, _TROCAR, _LATE = int(Event.CLEARANCE), int(Event.TROCAR_LEFT), int(Event.CONTROL_LATE)
-_PAUSED = int(_P)
-_CONTACT_MARGIN = 1.25
-_CLEARANCE_MARGIN = 0.001
+_LATE = int(Event.CONTROL_LATE)
 MEASUREMENT_TIMEOUT_S = 0.025
+"""A measurement is lost when it is older than this, and older than a tick and a half."""
 
 
 @compiled
@@ -258,78 +260,8 @@ def apply_event(state: np.ndarray, event: int) -> bool:
 
 
 @compiled
-def tracking_distance(x: np.ndarray, measured_q: np.ndarray) -> float:
-    """Largest distance in rad between commanded and measured joint angles."""
-    largest = 0.0
-    for i in range(7):
-        largest = max(largest, abs(x[i] - measured_q[i]))
-    return largest
-
-
-@compiled
-def servo_tracking_distance(
-    s: RecordFields, measured_servo: np.ndarray, parameters: np.ndarray
-) -> float:
-    """Largest distance in rad between commanded and measured servo angles."""
-    p = parameters[0]
-    told, servo = np.empty(2), np.empty(4)
-    commanded_bend(s, parameters, told)
-    servo_angles(told[0], told[1], p.pitch_radius, p.pulley_radius, servo)
-    largest = 0.0
-    for i in range(4):
-        largest = max(largest, abs(servo[i] - measured_servo[i]))
-    return largest
-
-
-@compiled
-def _measured(tick_input: RecordFields) -> bool:
-    """Whether the measurement is valid, recent, and made of numbers."""
-    total = 0.0
-    for k in range(7):
-        total += abs(tick_input.measured_q[k])
-    for k in range(4):
-        total += abs(tick_input.measured_servo[k])
-    recent = tick_input.measured_age_s <= MEASUREMENT_TIMEOUT_S
-    return bool(tick_input.measured_valid != 0 and recent and math.isfinite(total))
-
-
-@compiled
-def _watch_contact(outcome: np.ndarray, i: RecordFields, p: RecordFields) -> None:
-    """Pause where the contact force exceeds what is allowed.
-
-    Whoever enables in contact may move on with a little more force than there is, or nobody could
-    ever move away; once the force is below the limit, the limit counts again.
-    """
-    s = outcome[0].state
-    force = i.measured_contact
-    if i.request == _ENABLE:
-        s.contact_allowance = max(p.contact_force, _CONTACT_MARGIN * force)
-    if force <= p.contact_force:
-        s.contact_allowance = p.contact_force
-    if not force <= s.contact_allowance:
-        apply_event(outcome, _CONTACT)
-
-
-@compiled
-def _watch_clearance(outcome: np.ndarray, i: RecordFields, p: RecordFields) -> None:
-    """Pause where arm, shaft and wall come too near; fault where the shaft left the trocar.
-
-    Whoever enables too near may move on as long as it does not come nearer still.
-    """
-    s = outcome[0].state
-    if i.request == _ENABLE:
-        s.clearance_allowance = min(p.clearance, s.clearance - _CLEARANCE_MARGIN)
-    if s.clearance >= p.clearance:
-        s.clearance_allowance = p.clearance
-    if not s.clearance >= s.clearance_allowance:
-        apply_event(outcome, _CLEARANCE)
-    if not s.trocar_distance <= p.trocar_distance:
-        apply_event(outcome, _TROCAR)
-
-
-@compiled
-def _request(outcome: np.ndarray, i: RecordFields) -> bool:
-    """Apply this tick's request; True if the robot must take the measured joints as its own.
+def take_request(outcome: np.ndarray, i: RecordFields) -> bool:
+    """Apply this tick's request; True if the robot must take the measured axes as its own.
 
     Nobody enables a robot that is not ready; the server says why.
     """
@@ -346,19 +278,7 @@ def _request(outcome: np.ndarray, i: RecordFields) -> bool:
 
 
 @compiled
-def _take_measured(outcome: np.ndarray, i: RecordFields, parameters: np.ndarray) -> None:
-    """Take the measured joints and servos as the commanded ones."""
-    s = outcome[0].state
-    p = parameters[0]
-    for k in range(7):
-        s.x[k] = i.measured_q[k]
-    u, v = bend_from_servos(i.measured_servo, p.pitch_radius, p.pulley_radius)
-    follow_setting(s, i.settings.compensation, 1.0)
-    expected_bend(s, u, v, parameters)
-
-
-@compiled
-def _plant_speaks(outcome: np.ndarray, i: RecordFields) -> bool:
+def plant_speaks(outcome: np.ndarray, i: RecordFields) -> bool:
     """Apply what the plant tells, or that all its devices are back; True if it tells anything."""
     s = outcome[0].state
     if i.plant_event != 0:
@@ -370,42 +290,26 @@ def _plant_speaks(outcome: np.ndarray, i: RecordFields) -> bool:
 
 
 @compiled
-def decide(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) -> bool:
-    """Apply this tick's request and what the measurement tells to the state in ``outcome``.
+def is_recent(i: RecordFields) -> bool:
+    """Whether the measurement is valid and recent, as far as the plant knows."""
+    oldest = max(MEASUREMENT_TIMEOUT_S, 1.5 * i.dt_s)
+    return bool(i.measured_valid != 0 and i.measured_age_s <= oldest)
 
-    Args:
-        outcome: (1,) record whose ``state`` is changed.
-        tick_input: (1,) input record.
-        parameters: (1,) parameters.
 
-    Returns:
-        Whether the robot has just been enabled and takes the measured joints as its own; such a
-        tick does not move.
+@compiled
+def watch_lateness(outcome: np.ndarray, i: RecordFields, latest_s: float) -> None:
+    """Pause after a tick that began more than ``latest_s`` after its deadline."""
+    if not i.late_s <= latest_s:
+        apply_event(outcome, _LATE)
+
+
+@compiled
+def watch_leader(outcome: np.ndarray, i: RecordFields) -> None:
+    """Pause where the leader that leads has gone silent.
+
+    A leader that opened its clutch or gave way to another has left; its age is no matter.
     """
     s = outcome[0].state
-    i = tick_input[0]
-    p = parameters[0]
-    takes_measured = _request(outcome, i)
-    if _plant_speaks(outcome, i):
-        return False
-    if not _measured(i):
-        apply_event(outcome, _LOST)
-        return False
-    if not i.late_s <= p.late_tick:
-        apply_event(outcome, _LATE)
-    _watch_contact(outcome, i, p)
-    _watch_clearance(outcome, i, p)
-    if takes_measured and s.safety == _ENABLED:
-        _take_measured(outcome, i, parameters)
-        return True
-    follows = tracking_distance(s.x, i.measured_q) <= p.tracking_error
-    if not (
-        follows
-        and servo_tracking_distance(s, i.measured_servo, parameters) <= p.servo_tracking_error
-    ):
-        apply_event(outcome, _TRACKING)
-    # A leader that opened its clutch or gave way to another has left; its age is no matter.
     leads = s.engaged != 0 and i.leader.clutch != 0 and i.leader.kind == s.leader_kind
     if leads and not i.leader.age_s <= i.leader.timeout_s:
         apply_event(outcome, _STALE)
-    return False

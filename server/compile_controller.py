@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from robot.concentric.concentric_robot import ConcentricRobot
 from scenes.experiments import experiment
 from server.configuration_file import load
+from server.control.warm_up import warm_up_tubes
 from server.run.headless import HeadlessRun
 from server.run.options import options_for
 
@@ -16,6 +18,7 @@ def main() -> None:
     )
     ticks = iter(range(3))
     run.execute(lambda _: None, lambda: next(ticks, None) is None)
+    warm_up_tubes(ConcentricRobot(configuration))
 
 
 if __name__ == "__main__":

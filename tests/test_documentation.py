@@ -14,6 +14,7 @@ import pytest
 from starlette.routing import WebSocketRoute
 
 from robot.configuration import Configuration
+from robot.robots import TITLES
 from robot.safety import REASONS, TRANSITIONS
 from server.command_line import COMMANDS, _parser
 from server.configuration_file import load
@@ -21,10 +22,11 @@ from server.memory.link import WebLink
 from server.memory.link_records import create_mapped_files
 from server.web import api_stylus, refusals, stream
 from server.web.access import Access
-from server.web.api_robot import ROBOT
+from server.web.api_robot import robot_path
 from server.web.app import create_app
-from server.web.state_message import _REFUSED
-from server.web.state_schema import StateMessage
+from server.web.concentric_message import ConcentricMessages
+from server.web.instrument_message import InstrumentMessages
+from server.web.state_schema import ConcentricState, StateMessage
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
@@ -93,6 +95,7 @@ def _leaves(schema: dict[str, Any], root: dict[str, Any], prefix: str) -> dict[s
     return leaves
 
 
+ROBOT = robot_path("instrument")
 CONFIGURATION = ("key", "unit", "default", "allowed", "meaning")
 
 
@@ -105,14 +108,17 @@ def test_every_key_of_the_configuration_is_listed_with_its_range() -> None:
 def test_the_defaults_shown_are_those_of_the_file() -> None:
     file = tomllib.loads(_text("robot/keyhole.toml"))
     for key, _, default, _, _ in _rows("docs/configuration.md", *CONFIGURATION):
-        table, _, name = key.strip("`").rpartition(".")
         if default != "below":
-            assert _value(default) == (file[table] if table else file)[name], key
-    for part in ("joints", "links"):
-        header = tuple(file["arm"][part][0])
+            found: Any = file
+            for part in key.strip("`").split("."):
+                found = found[part]
+            assert _value(default) == found, key
+    listed = {"arm": ("joints", "links"), "concentric": ("tubes", "starts")}
+    for table, part in ((table, part) for table, parts in listed.items() for part in parts):
+        header = tuple(file[table][part][0])
         rows = _rows("docs/configuration.md", *header)
         assert [[_value(cell) for cell in row] for row in rows] == [
-            list(entry.values()) for entry in file["arm"][part]
+            list(entry.values()) for entry in file[table][part]
         ]
 
 
@@ -127,7 +133,8 @@ def test_operators_find_every_reason() -> None:
     header = ("state", "reason on the page", "what has happened", "what to do")
     listed = {(row[0], row[1]) for row in _rows("docs/operators.md", *header)}
     reached = {(row.next.name, REASONS[row.event][0]) for row in TRANSITIONS}
-    known = reached | {("ENABLED", reason) for reason, _ in _REFUSED.values()}
+    refused = [*InstrumentMessages.REFUSED.values(), *ConcentricMessages.REFUSED.values()]
+    known = reached | {("ENABLED", reason) for reason, _ in refused}
     assert listed == known | {("DISABLED", "started")}
 
 
@@ -178,15 +185,19 @@ def test_files_and_tests_that_are_named_exist() -> None:
 def test_the_interface_is_described_as_it_is(tmp_path: Path) -> None:
     create_mapped_files(tmp_path, rate_hz=500.0, ring_seconds=0.01)
     link = WebLink(tmp_path)
-    app = create_app(load(), link, Access("token", "127.0.0.1"))
+    access = Access("token", "127.0.0.1")
+    apps = [
+        create_app(load().model_copy(update={"robot": robot}), link, access) for robot in TITLES
+    ]
     link.close()
     known = {
-        (method.upper(), path)
+        (method.upper(), path.replace(robot_path("concentric"), ROBOT))
+        for app in apps
         for path, operations in app.openapi()["paths"].items()
         for method in operations
     }
     known |= {
-        ("WS", route.path)
+        ("WS", ROBOT + route.path)
         for route in (*stream.router.routes, *api_stylus.router.routes)
         if isinstance(route, WebSocketRoute)
     }
@@ -206,9 +217,12 @@ def test_every_field_of_the_state_is_described() -> None:
     for names, _ in _rows("docs/labs.md", "field", "what"):
         listed += re.findall(r"`(\w+)`", names)
     assert listed
-    assert sorted(listed) == sorted(
-        field.alias or name for name, field in StateMessage.model_fields.items()
-    )
+    told = {
+        field.alias or name
+        for schema in (StateMessage, ConcentricState)
+        for name, field in schema.model_fields.items()
+    }
+    assert sorted(listed) == sorted(told)
 
 
 def test_every_refusal_is_described() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot.records import RECORD, LeaderKind, Safety
+from robot.records import LeaderKind, RecordTypes, Safety
 from robot.safety import REASONS, Event
 from server.audit.reader import newest
 from server.audit.writer import AuditLog
@@ -29,11 +29,12 @@ class TransitionWatch:
     Args:
         directory: the run directory.
         log: of this process; it has a folder.
+        types: of the robot.
     """
 
-    def __init__(self, directory: Path, log: AuditLog) -> None:
+    def __init__(self, directory: Path, log: AuditLog, types: RecordTypes) -> None:
         self._log = log
-        self._ring = MappedRing(directory / RECORD_RING_FILE, RECORD)
+        self._ring = MappedRing(directory / RECORD_RING_FILE, types.record)
         self._sequence, self._known = 0, (-1, -1)
         assert log.where is not None
         for entry in reversed(newest(log.where, 50, event=STATE_CHANGED)):

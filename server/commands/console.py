@@ -11,12 +11,14 @@ import webbrowser
 from pathlib import Path
 from typing import get_args
 
-from robot.configuration import Compensation, Configuration, Hardware, Section, Simulation
+from robot.concentric.design import METHODS
+from robot.configuration import Compensation, Configuration, Hardware, Simulation
 from robot.errors import UnknownName
+from robot.section import Section
 from server.version import version
 
-ROBOTS = ("instrument", "hardware")
-"""The simulated instrument, and the same one with its real parts connected."""
+ROBOTS = ("instrument", "concentric", "hardware")
+"""The simulated instrument, simulated concentric-tube arms, the instrument with real parts."""
 
 ARMS = get_args(Hardware.model_fields["arm"].annotation)
 
@@ -39,7 +41,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add ``console`` to the command line."""
     parser = subparsers.add_parser("console", help="start the console (also without a command)")
     add_page_arguments(parser)
-    parser.add_argument("--robot", default=ROBOTS[0], help=f"one of: {', '.join(ROBOTS)}")
+    parser.add_argument("--robot", help=f"one of: {', '.join(ROBOTS)}; else as configured")
+    parser.add_argument("--method", choices=METHODS, help="of the concentric-tube arms")
+    parser.add_argument("--start", type=int, help="in which of its starts that robot wakes up")
     parser.add_argument("--servos", metavar="PORT", help="of the servo bus (--robot hardware)")
     parser.add_argument("--arm", choices=ARMS, help="which arm carries the servos")
     parser.add_argument("--stylus", metavar="URL", help="of the rosbridge behind a haptic stylus")
@@ -100,6 +104,11 @@ def configured(configuration: Configuration, arguments: argparse.Namespace) -> C
     if arguments.seed is not None:
         chosen["simulation"]["seed"] = arguments.seed
     chosen["hardware"] = {"connected": True} if arguments.robot == "hardware" else {}
+    chosen["concentric"] = {
+        name: getattr(arguments, name)
+        for name in ("method", "start")
+        if getattr(arguments, name) is not None
+    }
     chosen["servos"], chosen["stylus"] = {}, {}
     if arguments.servos is not None:
         chosen["servos"]["port"] = arguments.servos
@@ -113,7 +122,23 @@ def configured(configuration: Configuration, arguments: argparse.Namespace) -> C
         table: getattr(configuration, table).model_copy(update=values)
         for table, values in chosen.items()
     }
+    if arguments.robot is not None:
+        robot = "instrument" if arguments.robot == "hardware" else arguments.robot
+        return configuration.model_copy(update={**sections, "robot": robot})
     return configuration.model_copy(update=sections)
+
+
+def _check_robot(arguments: argparse.Namespace, configuration: Configuration) -> None:
+    """Refuse a robot or a start that does not exist.
+
+    Raises:
+        UnknownName: there is none of that name or number.
+    """
+    if arguments.robot not in (None, *ROBOTS):
+        raise UnknownName("robot", arguments.robot, ROBOTS)
+    starts = tuple(str(number) for number in range(1, len(configuration.concentric.starts) + 1))
+    if arguments.start is not None and str(arguments.start) not in starts:
+        raise UnknownName("start", arguments.start, starts)
 
 
 def execute(arguments: argparse.Namespace) -> int:
@@ -127,10 +152,10 @@ def execute(arguments: argparse.Namespace) -> int:
     """
     from server.configuration_file import load
 
-    if arguments.robot not in ROBOTS:
-        raise UnknownName("robot", arguments.robot, ROBOTS)
-    configuration = configured(load(arguments.config), arguments)
-    return serve(arguments, configuration, record=_recording_path(arguments.record))
+    configuration = load(arguments.config)
+    _check_robot(arguments, configuration)
+    chosen = configured(configuration, arguments)
+    return serve(arguments, chosen, record=_recording_path(arguments.record))
 
 
 def _recording_path(wanted: str | None) -> Path | None:
@@ -189,7 +214,7 @@ def serve(
                     "host": host,
                     "port": listener.getsockname()[1],
                     "address": address,
-                    "robot": ROBOTS[0],
+                    "robot": configuration.robot,
                     "started_ns": started_ns,
                 }
             )

@@ -49,17 +49,18 @@ def execute(arguments: argparse.Namespace) -> int:
     Raises:
         NothingToStop: there is no console, it shows a recording, or its control process is down.
     """
-    from robot.records import RECORD
+    from robot.record_types import record_types_of
     from server.audit.writer import AuditLog
     from server.memory.link_records import RECORD_SLOT_FILE
     from server.memory.mapped import MappedSlot
-    from server.memory.run_directory import default_path
+    from server.memory.run_directory import RunDirectory, default_path
     from server.supervision.stop_order import StopOrder
 
     path = arguments.run_directory or default_path()
     pid = int(_supervision(path)["control_pid"][0])
     _check_alive(path, pid)
-    order = StopOrder(MappedSlot(path / RECORD_SLOT_FILE, RECORD))
+    types = record_types_of(RunDirectory(path).configuration())
+    order = StopOrder(MappedSlot(path / RECORD_SLOT_FILE, types.record))
     if not order.send(pid):
         raise NothingToStop(path, "the control process has just ended")
     took_ms = order.wait(_PATIENCE_S)

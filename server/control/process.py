@@ -15,15 +15,16 @@ import sys
 import time
 import traceback
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robot.calibration import Calibration
 from robot.configuration import Configuration
 from robot.errors import KeyholeError
+from robot.record_types import record_types_of
 from server.control.lifeline import Lifeline
 from server.memory.control_link import ControlLink
 from server.memory.link_records import STATUS, Phase
@@ -31,7 +32,6 @@ from server.memory.run_directory import RunDirectory
 
 if TYPE_CHECKING:
     from server.control.runner import ControlRunner
-    from server.control.trocar import LoopTrocar
 
 _LOCK_PATIENCE_S = 10.0
 
@@ -62,13 +62,10 @@ class Status:
             self._record[name] = text.encode()
         self._write()
 
-    def show(self, trocar: LoopTrocar, board: str) -> None:
+    def show(self, surroundings: dict[str, Any]) -> None:
         """Publish where the trocar is registered, how it breathes, and which board is there."""
-        record, breathing = self._record, trocar.motion.wanted()
-        record["trocar_source"], record["trocar_registered"] = trocar.source, trocar.registered
-        record["breathing_amplitude"] = breathing.amplitude_m
-        record["breathing_period"] = breathing.period_s
-        record["board"] = board.encode()
+        for name, value in surroundings.items():
+            self._record[name] = value.encode() if isinstance(value, str) else value
         self._write()
 
     def _write(self) -> None:
@@ -89,60 +86,26 @@ def _lock(directory: RunDirectory) -> int:
 
 
 def _run(directory: RunDirectory, configuration: Configuration, lifeline: Lifeline) -> int:
-    link = ControlLink(directory.path)
-    status = Status(link, configuration.control.rate_hz)
+    link = ControlLink(directory.path, record_types_of(configuration))
+    status = Status(link, configuration.rate_hz)
     status.say(Phase.STARTING, "loading the controller")
-    from hardware.choose import breakable_plant
-    from robot.instrument_robot import InstrumentRobot
     from server.control import realtime
-    from server.control.loop import ControlLoop
+    from server.control.make_loop import make_loop
     from server.control.runner import ControlRunner
-    from server.control.warm_up import warm_up
 
-    status.say(Phase.STARTING, "compiling the controller (only after an update)")
-    robot = InstrumentRobot(configuration)
-    warm_up(robot, configuration)
-    calibration = directory.calibration()
-    if calibration is None:
-        calibration = _calibration(configuration, status)
-        directory.write_calibration(calibration)
-    robot = InstrumentRobot(configuration, calibration)
-    start = robot.initial_state()["x"][0]
-    plant = breakable_plant(configuration, start)
+    loop = make_loop(directory, configuration, partial(status.say, Phase.STARTING))
     try:
-        loop = ControlLoop(robot, plant, configuration)
         runner = ControlRunner(
-            loop, link, lifeline, configuration, lambda: status.show(loop.trocar, runner.board)
+            loop, link, lifeline, configuration.rate_hz, lambda: status.show(loop.surroundings())
         )
-        status.show(loop.trocar, runner.board)
+        status.show(loop.surroundings())
         signal.signal(signal.SIGTERM, lambda *_: runner.stop())
         signal.signal(signal.SIGUSR1, lambda *_: runner.emergency_stop())
         words = realtime.enter(configuration.control.realtime)
-        status.say(Phase.RUNNING, "running", realtime=words, plant=plant.spec.name)
+        status.say(Phase.RUNNING, "running", realtime=words, plant=loop.plant.spec.name)
         return drive(runner, status)
     finally:
-        plant.close()
-
-
-def _calibration(configuration: Configuration, status: Status) -> Calibration:
-    """The calibration that is kept for this robot; a simulated one is calibrated where none is."""
-    from server.calibration.file import CalibrationFileError, default_path, load_if_there, save
-    from server.calibration.sweep import calibration_for
-
-    path = default_path(configuration)
-    kept = load_if_there(path)
-    if kept is not None:
-        return kept
-    if configuration.hardware.connected:
-        # The bend of a real robot is measured by nothing here: it has to be given as a file.
-        return Calibration()
-    status.say(Phase.STARTING, "calibrating the tendons (a few seconds, once)")
-    # Made whatever the mode is now: it may be chosen later.
-    full = configuration.compensation.model_copy(update={"mode": "full"})
-    made = calibration_for(configuration.model_copy(update={"compensation": full}))
-    with contextlib.suppress(CalibrationFileError):
-        save(path, made)
-    return made
+        loop.plant.close()
 
 
 def drive(runner: ControlRunner, status: Status) -> int:

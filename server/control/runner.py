@@ -10,10 +10,9 @@ from collections.abc import Callable
 import numpy as np
 
 from hardware.devices import DEVICES
-from robot.configuration import Configuration
 from robot.records import Request, Safety
 from robot.safety import Event, apply_event
-from scenes.boards.board import BOARD_NAMES, board
+from scenes.boards.board import BOARD_NAMES
 from server.control.lifeline import Lifeline
 from server.control.loop import ControlLoop
 from server.control.mapped_path import MappedPath
@@ -37,11 +36,8 @@ class ControlRunner:
         loop: what is stepped.
         link: where requests come from and records go.
         lifeline: cut when the supervisor is gone.
-        configuration: of the robot; tells the rate and where boards stand.
+        rate_hz: how often it is stepped.
         changed: called after the board, the trocar or its breathing has changed.
-
-    Attributes:
-        board: name of the board before the instrument.
     """
 
     def __init__(
@@ -49,13 +45,12 @@ class ControlRunner:
         loop: ControlLoop,
         link: ControlLink,
         lifeline: Lifeline,
-        configuration: Configuration,
+        rate_hz: float,
         changed: Callable[[], None] = lambda: None,
     ) -> None:
         self._loop, self._link, self._lifeline = loop, link, lifeline
-        self._configuration, self._changed = configuration, changed
-        self.board: str = configuration.simulation.board
-        self._period_ns = round(1e9 / configuration.control.rate_hz)
+        self._changed = changed
+        self._period_ns = round(1e9 / rate_hz)
         self._excused = self._emergency = False
         # The link writes the active leader's sample right where the loop reads it.
         loop.leader = link.leader
@@ -125,7 +120,7 @@ class ControlRunner:
             loop.register_trocar(*link.trocar_change)
             self._changed()
         if link.breathing is not None:
-            loop.trocar.breathe(link.breathing, loop.time_s)
+            loop.breathe(link.breathing)
             self._changed()
         if link.board is not None and loop.safety == Safety.DISABLED:
             self._change_board(BOARD_NAMES[link.board])
@@ -157,11 +152,10 @@ class ControlRunner:
             self._loop.start_path(path, wanted.path_id, wanted.lock_arm)
 
     def _change_board(self, name: str) -> None:
-        """Put another board before the instrument; the ticks that are missed meanwhile are no
-        overruns, for a disabled robot waits for none.
+        """Put another board before the robot; the ticks that are missed meanwhile are no overruns,
+        for a disabled robot waits for none.
         """
-        self._loop.plant.change_board(board(name, self._configuration))
-        self.board = name
+        self._loop.change_board(name)
         self._excused = True
         self._changed()
 

@@ -7,10 +7,15 @@ import itertools
 import numpy as np
 
 from hardware.kinematic_plant import KinematicPlant
+from hardware.tube_plant import TubePlant
+from robot.concentric.concentric_robot import ConcentricRobot
+from robot.concentric.design import METHODS
 from robot.configuration import Configuration
 from robot.instrument_robot import InstrumentRobot
 from robot.records import Case, Coordinates, LeaderKind, Request, Solver
 from scenes.path import Path
+from server.control.concentric_loop import ConcentricLoop
+from server.control.instrument_loop import InstrumentLoop
 from server.control.loop import ControlLoop
 
 _TICKS_EACH = 3
@@ -25,7 +30,7 @@ def warm_up(robot: InstrumentRobot, configuration: Configuration) -> None:
         configuration: what it was built from.
     """
     plant = KinematicPlant(configuration, robot.initial_state()["x"][0])
-    loop = ControlLoop(robot, plant, configuration)
+    loop = InstrumentLoop(robot, plant, configuration)
     _request(loop, Request.ENABLE)
     loop.leader["timeout_s"] = 1.0
     loop.leader["wxyz"][0] = (1.0, 0.0, 0.0, 0.0)
@@ -46,12 +51,35 @@ def warm_up(robot: InstrumentRobot, configuration: Configuration) -> None:
     plant.close()
 
 
+def warm_up_tubes(robot: ConcentricRobot) -> None:
+    """The same for the concentric-tube arms; ``robot`` is left as it was."""
+    plant = TubePlant(robot.configuration, robot.initial_state()["q"][0])
+    loop = ConcentricLoop(robot, plant, robot.configuration)
+    _request(loop, Request.ENABLE)
+    loop.leader["timeout_s"], loop.leader["smoothing_s"] = 1.0, 0.05
+    loop.leader["wxyz"][0] = (1.0, 0.0, 0.0, 0.0)
+    loop.leader["kind"], loop.leader["clutch"] = LeaderKind.GIZMO, 1
+    for method in range(len(METHODS)):
+        loop.settings["method"] = method
+        for _ in range(_TICKS_EACH):
+            loop.leader["sequence"] += 1
+            loop.leader["position"][0, 0] += _STEP_M
+            loop.step()
+    loop.leader["clutch"] = 0
+    loop.step()
+    _play(loop)
+    _request(loop, Request.PAUSE)
+    _request(loop, Request.EMERGENCY_STOP)
+    _request(loop, Request.RESET)
+    plant.close()
+
+
 def _request(loop: ControlLoop, request: Request) -> None:
     loop.request = request
     loop.step()
 
 
-def _every_setting(loop: ControlLoop) -> None:
+def _every_setting(loop: InstrumentLoop) -> None:
     for case, solver, coordinates in itertools.product(Case, Solver, Coordinates):
         loop.settings["case"], loop.settings["solver"] = case, solver
         loop.settings["coordinates"] = coordinates

@@ -9,7 +9,9 @@ import threading
 import urllib.parse
 from typing import Any, NamedTuple
 
-from server.web.api_robot import ROBOT
+from server.web.api_robot import robot_path
+
+ROBOT = robot_path("instrument")
 
 
 class Answer(NamedTuple):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from robot.records import RECORD, Safety
+from robot.records import RecordTypes, Safety
 from server.memory.link_records import RECORD_SLOT_FILE
 from server.memory.mapped import MappedReadError, MappedSlot
 
@@ -19,9 +19,10 @@ class ControlView:
 
     Args:
         directory: the run directory.
+        types: of the robot.
 
     Attributes:
-        record: (1,) RECORD, its memory reused; meaningful while ``lives``.
+        record: (1,) of the robot's type, its memory reused; meaningful while ``lives``.
         lives: whether control had published lately at the last :meth:`update`.
         enabled: whether the robot was ENABLED then.
 
@@ -29,9 +30,9 @@ class ControlView:
         MappedFileError: no console keeps its files there.
     """
 
-    def __init__(self, directory: Path) -> None:
-        self._slot = MappedSlot(directory / RECORD_SLOT_FILE, RECORD)
-        self.record = np.zeros(1, RECORD)
+    def __init__(self, directory: Path, types: RecordTypes) -> None:
+        self._slot = MappedSlot(directory / RECORD_SLOT_FILE, types.record)
+        self.record = np.zeros(1, types.record)
         self._stamp = self.record["header"]["stamp_ns"]
         self._safety = self.record["outcome"]["state"]["safety"]
         self._seen = 0

@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from robot.configuration import Stylus
-from robot.records import LeaderKind
+from robot.record_types import record_types_of
+from robot.records import LeaderKind, RecordTypes
 from server.control.realtime import PRIORITY, enter, prefer
 from server.leaders import rosbridge
 from server.leaders.connection import Connection, ConnectionFailed, connect, wait
@@ -45,15 +46,19 @@ class StylusLeader:
     Args:
         directory: of a console whose mapped files exist.
         configuration: the section ``[stylus]``.
+        types: of the robot that is led.
     """
 
-    def __init__(self, directory: Path, configuration: Stylus) -> None:
+    def __init__(self, directory: Path, configuration: Stylus, types: RecordTypes) -> None:
         self._configuration = configuration
         self._reader = rosbridge.Reader(configuration.pose_topic, configuration.buttons_topic)
         self._slot = LeaderSlot(directory, LeaderKind.STYLUS)
         self._status = StylusStatusFile(directory, writable=True)
-        self._view = ControlView(directory)
-        self._servo = self._view.record["outcome"]["command"]["servo"][0]
+        self._view = ControlView(directory, types)
+        command = self._view.record["outcome"]["command"]
+        assert command.dtype.names is not None
+        # Only the instrument has servos that firmware elsewhere could follow.
+        self._servo = command["servo"][0] if "servo" in command.dtype.names else None
         self.stylus = StylusInput(self._slot, configuration)
         self._spring = SpringForce(configuration, self._view)
         self._report = StylusReport(configuration.url)
@@ -146,7 +151,7 @@ class StylusLeader:
     def _command_servos(self, now_ns: int) -> None:
         """Tell firmware that listens on a topic where the servos shall go, while ENABLED."""
         connection, topic = self._connection, self._configuration.servo_command_topic
-        if connection is None or not topic or not self._view.enabled:
+        if connection is None or not topic or self._servo is None or not self._view.enabled:
             return
         if now_ns - self._servos_ns < _SERVO_NS:
             return
@@ -210,7 +215,8 @@ class StylusLeader:
 def _lead(arguments: argparse.Namespace, stopped: Stopped) -> None:
     directory = RunDirectory(arguments.run_directory)
     configuration = directory.configuration()
-    leader = StylusLeader(directory.path, configuration.stylus)
+    types = record_types_of(configuration)
+    leader = StylusLeader(directory.path, configuration.stylus, types)
     # On a busy machine samples otherwise come late, which control must take for silence.
     if not enter(configuration.control.realtime, PRIORITY - 10).startswith("SCHED_FIFO"):
         prefer()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hardware.devices import DEVICES
-from robot.records import LEADER, RECORD, SETTINGS, Request
+from robot.records import INSTRUMENT, LEADER, RecordTypes, Request
 from scenes.trocar_motion import Breathing
 from server.control.leader_choice import NOBODY, LeaderChoice
 from server.memory.link_records import (
@@ -33,7 +33,6 @@ from server.memory.link_records import (
     RECORD_SLOT_FILE,
     RELEASE_TORQUE,
     REQUEST_FILE,
-    REQUEST_MESSAGE,
     SETTINGS_CHANGE,
     STATUS,
     STATUS_FILE,
@@ -44,6 +43,7 @@ from server.memory.link_records import (
     TrocarSource,
     leader_file,
     path_file,
+    request_message,
 )
 from server.memory.mapped import MappedReadError, MappedRing, MappedSlot
 
@@ -86,11 +86,12 @@ class ControlLink:
 
     Args:
         directory: the run directory.
+        types: of the robot that is controlled.
 
     Attributes:
         request: the :class:`robot.records.Request` of this tick; NONE for none.
         request_sequence: number of the last request taken in.
-        settings: (1,) SETTINGS, meaningful where ``settings_changed`` is True.
+        settings: (1,) settings, meaningful where ``settings_changed`` is True.
         settings_changed: whether new settings came in with this tick.
         path_start: a path to start in this tick, or None.
         path_stop: whether to stop the path in this tick.
@@ -107,17 +108,17 @@ class ControlLink:
         MappedFileError: no console keeps its files there.
     """
 
-    def __init__(self, directory: Path | str) -> None:
+    def __init__(self, directory: Path | str, types: RecordTypes = INSTRUMENT) -> None:
         self._directory = Path(directory)
 
         def slot(name: str, dtype: np.dtype[Any], writable: bool = False) -> MappedSlot:
             return MappedSlot(self._directory / name, dtype, writable=writable)
 
-        self._record = slot(RECORD_SLOT_FILE, RECORD, writable=True)
-        self._ring = MappedRing(self._directory / RECORD_RING_FILE, RECORD, writable=True)
+        self._record = slot(RECORD_SLOT_FILE, types.record, writable=True)
+        self._ring = MappedRing(self._directory / RECORD_RING_FILE, types.record, writable=True)
         self._status = slot(STATUS_FILE, STATUS, writable=True)
         self._devices = slot(DEVICES_FILE, DEVICES, writable=True)
-        self._requests = MappedRing(self._directory / REQUEST_FILE, REQUEST_MESSAGE)
+        self._requests = MappedRing(self._directory / REQUEST_FILE, request_message(types))
         self._emergency = slot(EMERGENCY_FILE, EMERGENCY)
         self._supervision = _Inbox(slot(SUPERVISION_FILE, SUPERVISION))
         self._hold = _Inbox(slot(HOLD_FILE, HOLD_SLOT))
@@ -131,7 +132,7 @@ class ControlLink:
         self._operator_lost = self._loss_is_new = False
         self.request = int(Request.NONE)
         self.request_sequence = self._requests.sequence
-        self.settings = np.zeros(1, dtype=SETTINGS)
+        self.settings = np.zeros(1, dtype=types.settings)
         self.settings_changed = False
         self.path_start: PathStart | None = None
         self.path_stop = False
@@ -252,7 +253,7 @@ class ControlLink:
         self._leader_clutch[0] = 0
 
     def publish(self, record: NDArray[Any]) -> None:
-        """Publish a (1,) RECORD into the ring and as the newest.
+        """Publish a (1,) record into the ring and as the newest.
 
         In this order: a reader that has seen the newest finds it in the ring.
         """

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from hardware.devices import DEVICES
 from robot.errors import InvalidPose
-from robot.records import RECORD, DriveMode, LeaderKind, Request
+from robot.records import INSTRUMENT, DriveMode, LeaderKind, RecordTypes, Request
 from scenes.trocar_motion import Breathing
 from server.memory.leader_slot import SMALLEST_QUATERNION, LeaderSlot
 from server.memory.link_records import (
@@ -43,7 +43,6 @@ from server.memory.link_records import (
     RECORD_SLOT_FILE,
     RELEASE_TORQUE,
     REQUEST_FILE,
-    REQUEST_MESSAGE,
     SETTINGS_CHANGE,
     STATUS,
     STATUS_FILE,
@@ -56,6 +55,7 @@ from server.memory.link_records import (
     Phase,
     TrocarSource,
     path_file,
+    request_message,
 )
 from server.memory.mapped import MappedReadError, MappedRing, MappedSlot
 
@@ -69,23 +69,28 @@ class WebLink:
 
     Args:
         directory: the run directory.
+        types: of the robot that control drives.
 
     Attributes:
-        directory: the same.
+        directory, types: the same.
 
     Raises:
         MappedFileError: no console keeps its files there.
     """
 
-    def __init__(self, directory: Path | str) -> None:
+    def __init__(self, directory: Path | str, types: RecordTypes = INSTRUMENT) -> None:
         self.directory = self._directory = Path(directory)
+        self.types = types
+        self._request_type = request_message(types)
         self._lock = threading.Lock()
         self._emergency_lock = threading.Lock()
-        self._record = MappedSlot(self._directory / RECORD_SLOT_FILE, RECORD)
+        self._record = MappedSlot(self._directory / RECORD_SLOT_FILE, types.record)
         self._status = MappedSlot(self._directory / STATUS_FILE, STATUS)
         self._supervision = MappedSlot(self._directory / SUPERVISION_FILE, SUPERVISION)
         self._devices = MappedSlot(self._directory / DEVICES_FILE, DEVICES)
-        self._requests = MappedRing(self._directory / REQUEST_FILE, REQUEST_MESSAGE, writable=True)
+        self._requests = MappedRing(
+            self._directory / REQUEST_FILE, self._request_type, writable=True
+        )
         self._emergency = MappedSlot(self._directory / EMERGENCY_FILE, EMERGENCY, writable=True)
         self._hold = MappedSlot(self._directory / HOLD_FILE, HOLD_SLOT, writable=True)
         self._alive = MappedSlot(self._directory / ALIVE_FILE, ALIVE, writable=True)
@@ -101,7 +106,7 @@ class WebLink:
         return self._send(kind)
 
     def settings(self, settings: NDArray[Any]) -> int:
-        """Send the operator's choices, (1,) or () SETTINGS; returns the number to wait for."""
+        """Send the operator's choices, (1,) or () settings; returns the number to wait for."""
         return self._send(SETTINGS_CHANGE, settings=settings)
 
     def start_path(self, samples: NDArray[np.float64], name: str, lock_arm: bool = False) -> int:
@@ -267,7 +272,7 @@ class WebLink:
 
     def ring(self) -> MappedRing:
         """A reader of every record of the last seconds; the caller closes it."""
-        return MappedRing(self._directory / RECORD_RING_FILE, RECORD)
+        return MappedRing(self._directory / RECORD_RING_FILE, self.types.record)
 
     def status(self) -> dict[str, Any]:
         """What is known of the control process.
@@ -320,7 +325,7 @@ class WebLink:
             return self._send_locked(kind, **fields)
 
     def _send_locked(self, kind: int, **fields: Any) -> int:
-        message = np.zeros(1, dtype=REQUEST_MESSAGE)
+        message = np.zeros(1, dtype=self._request_type)
         number = self._requests.sequence + 1
         message["sequence"], message["kind"] = number, int(kind)
         message["stamp_ns"] = time.monotonic_ns()

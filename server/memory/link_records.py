@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from enum import IntEnum
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hardware.devices import DEVICES
-from robot.records import LEADER, RECORD, SETTINGS, LeaderKind
+from robot.records import INSTRUMENT, LEADER, LeaderKind, RecordTypes
 from server.memory.mapped import MappedRing, MappedSlot
 from server.memory.recording_link import create_recording_files
 from server.memory.stylus_records import create_stylus_files
@@ -28,7 +29,7 @@ RELEASE_TORQUE = 107
 TAKE_HOLD = 108
 REBOOT_DEVICES = 109
 INJECT_FAULT = 110
-"""Kinds of REQUEST_MESSAGE beside those of :class:`robot.records.Request`."""
+"""Kinds of :func:`request_message` beside those of :class:`robot.records.Request`."""
 
 
 class Phase(IntEnum):
@@ -56,26 +57,29 @@ class TrocarSource(IntEnum):
     ENTER = 2
 
 
-REQUEST_MESSAGE = np.dtype(
-    [
-        ("sequence", "i8"),
-        ("kind", "i8"),
-        ("path_id", "i8"),
-        ("path_rows", "i8"),
-        ("path_locks_arm", "i8"),
-        ("stamp_ns", "i8"),
-        ("settings", SETTINGS),
-        ("trocar_source", "i8"),
-        ("trocar_position", "f8", 3),
-        ("breathing_amplitude", "f8"),
-        ("breathing_period", "f8"),
-        ("board", "i8"),
-        ("fault", "S32"),
-    ]
-)
-"""Web to control: a Request or one of the kinds above, with the fields that belong to it: SI, base
-frame; ``board`` is a place in ``scenes.boards.board.BOARD_NAMES``; ``fault`` is one of
-``hardware.faulty_plant.FAULTS``, or empty to clear them."""
+def request_message(types: RecordTypes) -> np.dtype[Any]:
+    """Web to control: a Request or one of the kinds above, with the fields that belong to it: SI,
+    base frame; ``board`` is a place in ``scenes.boards.board.BOARD_NAMES``; ``fault`` is one of
+    those of ``hardware.faulty_plant``, or empty to clear them.
+    """
+    return np.dtype(
+        [
+            ("sequence", "i8"),
+            ("kind", "i8"),
+            ("path_id", "i8"),
+            ("path_rows", "i8"),
+            ("path_locks_arm", "i8"),
+            ("stamp_ns", "i8"),
+            ("settings", types.settings),
+            ("trocar_source", "i8"),
+            ("trocar_position", "f8", 3),
+            ("breathing_amplitude", "f8"),
+            ("breathing_period", "f8"),
+            ("board", "i8"),
+            ("fault", "S32"),
+        ]
+    )
+
 
 EMERGENCY = np.dtype([("count", "i8"), ("stamp_ns", "i8")])
 """Web to control: a press of the emergency stop. That it was written at all is the press."""
@@ -157,14 +161,22 @@ def path_file(path_id: int) -> str:
     return f"path_{path_id}.f8"
 
 
-def create_mapped_files(directory: Path, rate_hz: float, ring_seconds: float) -> None:
+def create_mapped_files(
+    directory: Path, rate_hz: float, ring_seconds: float, types: RecordTypes = INSTRUMENT
+) -> None:
     """Make every mapped file of a console, replacing those that exist.
+
+    Args:
+        directory: the run directory.
+        rate_hz: rate of the control loop.
+        ring_seconds: how long the ring of records reaches back.
+        types: of the robot.
 
     Raises:
         MappedFileError: there is no room for them.
     """
     slots = {
-        RECORD_SLOT_FILE: RECORD,
+        RECORD_SLOT_FILE: types.record,
         EMERGENCY_FILE: EMERGENCY,
         HOLD_FILE: HOLD_SLOT,
         ALIVE_FILE: ALIVE,
@@ -176,7 +188,8 @@ def create_mapped_files(directory: Path, rate_hz: float, ring_seconds: float) ->
     for name, dtype in slots.items():
         MappedSlot(directory / name, dtype, create=True).close()
     capacity = max(2, round(rate_hz * ring_seconds))
-    MappedRing(directory / RECORD_RING_FILE, RECORD, capacity, create=True).close()
-    MappedRing(directory / REQUEST_FILE, REQUEST_MESSAGE, REQUEST_CAPACITY, create=True).close()
+    MappedRing(directory / RECORD_RING_FILE, types.record, capacity, create=True).close()
+    requests = request_message(types)
+    MappedRing(directory / REQUEST_FILE, requests, REQUEST_CAPACITY, create=True).close()
     create_recording_files(directory)
     create_stylus_files(directory)

@@ -181,6 +181,13 @@ class RunDirectory:
         """The configuration of this console, as the supervisor validated it at the start."""
         return Configuration.model_validate_json(self._read(_CONFIGURATION))
 
+    def change_robot(self, configuration: Configuration) -> None:
+        """From now on this console drives the robot of another ``configuration``."""
+        self.write_configuration(configuration)
+        self.write_console(self.console() | {"robot": configuration.robot})
+        # The calibration of the robot before; the next one's control finds its own.
+        (self.path / _CALIBRATION).unlink(missing_ok=True)
+
     def write_calibration(self, calibration: Calibration) -> None:
         """Store the calibration that every process of this console uses."""
         self.write(_CALIBRATION, calibration.model_dump_json().encode())

@@ -121,6 +121,33 @@ def _joints(record: RecordFields, _: int) -> dict[str, Any]:
     }
 
 
+def _relative_errors(record: RecordFields, _: int) -> dict[str, Any]:
+    truth = record["truth"]
+    return {
+        "position_mm": _round(truth["position_error"] * 1e3),
+        "relative_mm": _round(truth["relative_error"] * 1e3),
+        "source": ErrorSource(int(truth["source"])).name.lower(),
+    }
+
+
+def _true_b(record: RecordFields, time_ns: int) -> dict[str, Any]:
+    return _pose(time_ns, record["truth"]["position_b"], record["truth"]["wxyz_b"])
+
+
+def _tubes(record: RecordFields, _: int) -> dict[str, Any]:
+    report, measured = record["outcome"]["report"], record["input"]["measured_q"]
+    commanded = report["q"].reshape(2, 2, -1)
+    there = measured.reshape(2, 2, -1)
+    message: dict[str, Any] = {}
+    for arm, name in enumerate("ab"):
+        message[f"translation_commanded_{name}_mm"] = (commanded[arm, 0] * 1e3).round(6).tolist()
+        message[f"translation_measured_{name}_mm"] = (there[arm, 0] * 1e3).round(6).tolist()
+        message[f"rotation_commanded_{name}_deg"] = np.rad2deg(commanded[arm, 1]).round(5).tolist()
+        message[f"rotation_measured_{name}_deg"] = np.rad2deg(there[arm, 1]).round(5).tolist()
+        message[f"stability_{name}"] = _round(report["stability"][arm])
+    return message
+
+
 def _forces(record: RecordFields, _: int) -> dict[str, Any]:
     return {
         "tension_n": record["input"]["measured_tension"].round(5).tolist(),
@@ -146,6 +173,29 @@ _ERRORS_SCHEMA = _object(
         "orientation_deg": _NUMBER,
         "rcm_mm": _NUMBER,
         "source": {**_TEXT, "description": "errors are desired minus true, or minus measured"},
+    },
+)
+_RELATIVE_ERRORS_SCHEMA = _object(
+    "keyhole.RelativeErrors",
+    {
+        "position_mm": {**_NUMBER, "description": "of A's tip"},
+        "relative_mm": {**_NUMBER, "description": "of B's tip from its place beside A's"},
+        "source": {**_TEXT, "description": "errors are desired minus true, or minus measured"},
+    },
+)
+_EACH_TUBE: dict[str, Any] = {"type": "array", "items": _NUMBER}
+_TUBES_SCHEMA = _object(
+    "keyhole.Tubes",
+    {
+        f"{name}_{arm}{unit}": schema
+        for arm in "ab"
+        for name, unit, schema in (
+            ("translation_commanded", "_mm", _EACH_TUBE),
+            ("translation_measured", "_mm", _EACH_TUBE),
+            ("rotation_commanded", "_deg", _EACH_TUBE),
+            ("rotation_measured", "_deg", _EACH_TUBE),
+            ("stability", "", {**_NUMBER, "description": "1 far from snapping, 0 where it snaps"}),
+        )
     },
 )
 _JOINTS_SCHEMA = _object(
@@ -178,15 +228,31 @@ _SAFETY_SCHEMA = _object(
     },
 )
 
-JSON_CHANNELS = (
-    JsonChannel("/errors", "keyhole.Errors", _ERRORS_SCHEMA, _errors),
+_SHARED_CHANNELS = (
     JsonChannel("/tip/desired", "foxglove.PoseInFrame", _POSE, _desired),
     JsonChannel("/tip/commanded", "foxglove.PoseInFrame", _POSE, _commanded),
     JsonChannel("/tip/true", "foxglove.PoseInFrame", _POSE, _true),
-    JsonChannel("/joints", "keyhole.Joints", _JOINTS_SCHEMA, _joints),
-    JsonChannel("/forces", "keyhole.Forces", _FORCES_SCHEMA, _forces),
     JsonChannel("/safety", "keyhole.Safety", _SAFETY_SCHEMA, _safety),
 )
+
+_OWN_CHANNELS = {
+    "instrument": (
+        JsonChannel("/errors", "keyhole.Errors", _ERRORS_SCHEMA, _errors),
+        JsonChannel("/joints", "keyhole.Joints", _JOINTS_SCHEMA, _joints),
+        JsonChannel("/forces", "keyhole.Forces", _FORCES_SCHEMA, _forces),
+    ),
+    "concentric": (
+        JsonChannel("/errors", "keyhole.RelativeErrors", _RELATIVE_ERRORS_SCHEMA, _relative_errors),
+        JsonChannel("/tip/b", "foxglove.PoseInFrame", _POSE, _true_b),
+        JsonChannel("/tubes", "keyhole.Tubes", _TUBES_SCHEMA, _tubes),
+    ),
+}
+
+
+def json_channels(robot: str) -> tuple[JsonChannel, ...]:
+    """The channels of the robot of that name."""
+    return _OWN_CHANNELS[robot] + _SHARED_CHANNELS
+
 
 GAP_SCHEMA = _object(
     "keyhole.Gap",

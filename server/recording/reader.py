@@ -22,7 +22,8 @@ from pydantic import ValidationError
 
 from robot.calibration import Calibration, CalibrationRefused, parse_calibration
 from robot.configuration import Configuration
-from robot.records import RECORD, SCHEMA_VERSION
+from robot.record_types import record_types_of
+from robot.records import SCHEMA_VERSION, RecordTypes
 from server.recording.channels import RECORDS
 from server.recording.errors import (
     NotARecording,
@@ -56,7 +57,7 @@ class ChunkPlace(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """Neighbouring records: their numbers (n,), times in ns (n,), and themselves (n,) RECORD."""
+    """Neighbouring records: their numbers (n,), times in ns (n,), and themselves (n,)."""
 
     sequence: NDArray[np.int64]
     time_ns: NDArray[np.int64]
@@ -76,6 +77,7 @@ class Recording:
         metadata: versions, machine, start and plant, as the writer put them down.
         attachments: files in it (``configuration.json``, ``calibration.json``), by name.
         chunks: where its records are.
+        types: of the recorded robot.
         cut: whether it ends without its summary.
         start_ns: time of the first record, ns since 1970; ``duration_s``: from it to the last.
 
@@ -84,6 +86,7 @@ class Recording:
         NotARecording: it is something else.
         RecordingVersion: its records have another form.
         RecordingEmpty: it holds no ticks.
+        RecordingConfiguration: its configuration is not one that this version knows.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -185,11 +188,12 @@ class Recording:
             raise RecordingVersion(self.path, found, SCHEMA_VERSION, made_by)
         if RECORDS not in self._channels:
             raise RecordingEmpty(self.path)
+        self.types: RecordTypes = record_types_of(self.configuration())
         channel = self._channels[RECORDS]
         schema = self._schemas.get(channel.schema_id)
         try:
             same = schema is not None and schema.encoding == NUMPY
-            same = same and schema is not None and understand(schema.data) == RECORD
+            same = same and schema is not None and understand(schema.data) == self.types.record
         except ValueError as error:
             detail = f"is damaged: {error}"
             raise RecordingUnreadable(self.path, detail) from None
@@ -280,11 +284,11 @@ class Recording:
                     heads.append((sequence, time_ns))
                     found.append(content[place + _MESSAGE_HEAD.size : place + length])
             place += length
-        if any(len(one) != RECORD.itemsize for one in found):
+        if any(len(one) != self.types.record.itemsize for one in found):
             raise RecordingUnreadable(self.path, f"is damaged: a record at byte {chunk.offset}")
         columns = np.array(heads, dtype=np.int64).reshape(-1, 2)
         # Writable and aligned: for other arrays the compiled functions would be compiled anew.
-        records = np.empty(len(found), dtype=RECORD)
+        records = np.empty(len(found), dtype=self.types.record)
         records.view(np.uint8)[:] = np.frombuffer(b"".join(found), dtype=np.uint8)
         return Batch(columns[:, 0], columns[:, 1], records)
 

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from robot.errors import KeyholeError
-from robot.records import RECORD
+from robot.record_types import record_types_of
 from server.audit.transitions import TransitionWatch
 from server.audit.writer import AuditLog
 from server.memory.link_records import RECORD_RING_FILE, STATUS, STATUS_FILE
@@ -56,7 +56,8 @@ class Recorder:
     def __init__(self, directory: RunDirectory) -> None:
         path = directory.path
         self._directory = directory
-        self._ring = MappedRing(path / RECORD_RING_FILE, RECORD)
+        self._types = record_types_of(directory.configuration())
+        self._ring = MappedRing(path / RECORD_RING_FILE, self._types.record)
         self._control = MappedSlot(path / STATUS_FILE, STATUS)
         self._request = MappedSlot(path / RECORDING_REQUEST_FILE, RECORDING_REQUEST)
         self._status = MappedSlot(path / RECORDING_FILE, RECORDING, writable=True)
@@ -228,7 +229,7 @@ def _record(arguments: argparse.Namespace, stopped: Stopped) -> None:
     directory = RunDirectory(arguments.run_directory)
     recorder = Recorder(directory)
     audit = AuditLog.of_console("recorder", directory.path)
-    transitions = TransitionWatch(directory.path, audit)
+    transitions = TransitionWatch(directory.path, audit, record_types_of(directory.configuration()))
     while not stopped():
         recorder.step()
         transitions.step()

@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from robot.records import RECORD
 from server.memory.link_records import (
     RECORD_RING_FILE,
     RECORD_SLOT_FILE,
@@ -94,8 +93,9 @@ class Replay:
 
     def __init__(self, directory: Path, recording: Recording) -> None:
         self._recording, self._timeline = recording, Timeline(recording)
-        self._slot = MappedSlot(directory / RECORD_SLOT_FILE, RECORD, writable=True)
-        self._ring = MappedRing(directory / RECORD_RING_FILE, RECORD, writable=True)
+        record = recording.types.record
+        self._slot = MappedSlot(directory / RECORD_SLOT_FILE, record, writable=True)
+        self._ring = MappedRing(directory / RECORD_RING_FILE, record, writable=True)
         self._control = MappedSlot(directory / STATUS_FILE, STATUS, writable=True)
         self._request = MappedSlot(directory / REPLAY_REQUEST_FILE, REPLAY_REQUEST)
         self._replay = MappedSlot(directory / REPLAY_FILE, REPLAY, writable=True)

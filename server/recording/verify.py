@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot.instrument_robot import InstrumentRobot
-from robot.records import OUTCOME
+from robot.robots import Robot, make_robot
 from server.recording.machine import differences
 from server.recording.reader import Batch, Recording
 
@@ -68,17 +67,17 @@ def verify(
         RecordingConfiguration: the recorded configuration or calibration is not known.
         RecordingUnreadable: a part of the recording is damaged.
     """
-    robot = InstrumentRobot(recording.configuration(), recording.calibration())
+    robot = make_robot(recording.configuration(), recording.calibration())
     return _Check(recording, robot).run(progress)
 
 
 class _Check:
-    def __init__(self, recording: Recording, robot: InstrumentRobot) -> None:
+    def __init__(self, recording: Recording, robot: Robot) -> None:
         self._recording, self._robot = recording, robot
         self._result = Verification(otherwise=differences(recording.metadata))
         self._before: NDArray[Any] | None = None
         self._sequence = 0
-        self._outcome = np.zeros(1, OUTCOME)
+        self._outcome = np.zeros(1, recording.types.outcome)
 
     def run(self, progress: Callable[[float], None]) -> Verification:
         total = len(self._recording.chunks)

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from robot.configuration import Configuration
-from robot.records import RECORD, SCHEMA_VERSION
+from robot.record_types import record_types_of
+from robot.records import SCHEMA_VERSION
 from server.recording.channels import (
     GAP_SCHEMA,
     GAPS,
-    JSON_CHANNELS,
     RATE_HZ,
     RECORDS,
+    json_channels,
     message_bytes,
     schema_bytes,
 )
@@ -40,18 +41,21 @@ _SYNCHRONISE_S = 2.0
 _MESSAGE_OPCODE = 5
 _HEAD = struct.Struct("<BQHIQQ")
 _OPCODE_AND_LENGTH = 9
-_MESSAGE = np.dtype(
-    [
-        ("opcode", "<u1"),
-        ("length", "<u8"),
-        ("channel", "<u2"),
-        ("sequence", "<u4"),
-        ("log_time", "<u8"),
-        ("publish_time", "<u8"),
-        ("record", RECORD),
-    ]
-)
-"""A record as one MCAP message: packed, without padding."""
+
+
+def _message(record: np.dtype[Any]) -> np.dtype[Any]:
+    """A record as one MCAP message: packed, without padding."""
+    return np.dtype(
+        [
+            ("opcode", "<u1"),
+            ("length", "<u8"),
+            ("channel", "<u2"),
+            ("sequence", "<u4"),
+            ("log_time", "<u8"),
+            ("publish_time", "<u8"),
+            ("record", record),
+        ]
+    )
 
 
 class RecordingWriter:
@@ -100,7 +104,10 @@ class RecordingWriter:
         plant: str = "",
         board: str = "",
     ) -> None:
-        rate_hz = configuration.control.rate_hz
+        rate_hz = configuration.rate_hz
+        self._types = record_types_of(configuration)
+        self._channels = json_channels(self._types.robot)
+        message = _message(self._types.record)
         self.path = Path(path)
         self.ticks = self.gaps = self.lost = 0
         self._started_ns = time.time_ns()
@@ -109,9 +116,9 @@ class RecordingWriter:
         self._first_ns = self._last_ns = 0
         self._next_sequence: int | None = None
         self._every = max(1, round(rate_hz / RATE_HZ))
-        self._pending = np.zeros(max(1, round(rate_hz * CHUNK_S)), _MESSAGE)
+        self._pending = np.zeros(max(1, round(rate_hz * CHUNK_S)), message)
         self._pending["opcode"] = _MESSAGE_OPCODE
-        self._pending["length"] = _MESSAGE.itemsize - _OPCODE_AND_LENGTH
+        self._pending["length"] = message.itemsize - _OPCODE_AND_LENGTH
         self._waiting = 0
         self._extra: list[bytes] = []
         self._extra_times: dict[int, list[tuple[int, int]]] = {}
@@ -132,7 +139,7 @@ class RecordingWriter:
             {
                 "recording_version": str(RECORDING_VERSION),
                 "record_schema_version": str(SCHEMA_VERSION),
-                "robot": "instrument",
+                "robot": self._types.robot,
                 **names,
                 "configuration_hash": f"{configuration.hash64():016x}",
                 "started": datetime.fromtimestamp(now_ns * 1e-9, UTC).isoformat(),
@@ -146,10 +153,10 @@ class RecordingWriter:
             if model is not None:
                 content = model.model_dump_json(indent=1).encode()
                 file.add_attachment(name, "application/json", content, now_ns)
-        record_schema = ("keyhole.Record", NUMPY, describe(RECORD))
+        record_schema = ("keyhole.Record", NUMPY, describe(self._types.record))
         self._pending["channel"] = file.add_channel(RECORDS, NUMPY, record_schema)
         self._json = []
-        for one in JSON_CHANNELS:
+        for one in self._channels:
             schema = (one.schema_name, "jsonschema", schema_bytes(one.schema))
             self._json.append((file.add_channel(one.topic, "json", schema), one))
         gap_schema = ("keyhole.Gap", "jsonschema", schema_bytes(GAP_SCHEMA))
@@ -166,7 +173,7 @@ class RecordingWriter:
         return (self._last_ns - self._first_ns) * 1e-9
 
     def append(self, records: NDArray[Any], sequence: int | None = None) -> None:
-        """Take records in, shape (n,) or () ``RECORD``, oldest first.
+        """Take records in, shape (n,) or (), of the robot's type, oldest first.
 
         Args:
             records: they are copied.
@@ -239,7 +246,7 @@ class RecordingWriter:
         if waiting:
             messages = self._pending[:waiting]
             size = messages.nbytes
-            places = range(0, size, _MESSAGE.itemsize)
+            places = range(0, size, messages.dtype.itemsize)
             times = {
                 int(messages["channel"][0]): list(
                     zip(messages["log_time"].tolist(), places, strict=True)

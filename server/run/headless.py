@@ -20,7 +20,7 @@ from robot.segment import polar
 from scenes.lead_in import anchored
 from scenes.path import Path
 from server.calibration.sweep import calibration_for
-from server.control.loop import ControlLoop
+from server.control.instrument_loop import InstrumentLoop
 from server.run.options import RunOptions, check_names
 
 TRACE_COLUMNS = (
@@ -145,7 +145,7 @@ class HeadlessRun:
         self._robot = InstrumentRobot(configuration, self.calibration)
         x = self._robot.initial_state()["x"][0]
         self._plant = simulated_plant(configuration, x)
-        self._loop = ControlLoop(self._robot, self._plant, configuration)
+        self._loop = InstrumentLoop(self._robot, self._plant, configuration)
         self.steps = math.ceil(options.path.duration_s * configuration.control.rate_hz) + 1
         self.dt_s = 1.0 / configuration.control.rate_hz
 

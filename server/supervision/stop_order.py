@@ -10,7 +10,7 @@ import os
 import signal
 import time
 
-from robot.records import RECORD, Safety
+from robot.records import Safety
 from robot.safety import Event
 from server.memory.mapped import MappedReadError, MappedSlot
 
@@ -25,7 +25,6 @@ class StopOrder:
     """
 
     def __init__(self, records: MappedSlot) -> None:
-        assert records.dtype == RECORD
         self._records = records
         self._sent_ns = 0
 

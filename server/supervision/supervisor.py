@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot.configuration import Configuration
-from robot.records import RECORD
+from robot.record_types import record_types_of
 from server.audit.wall_clock import WallClock
 from server.audit.writer import AuditLog
 from server.memory.link_records import (
@@ -37,6 +37,7 @@ from server.memory.link_records import (
 from server.memory.mapped import MappedReadError, MappedSlot
 from server.memory.recording_link import RecordingLink
 from server.memory.replay_link import create_replay_files
+from server.memory.robot_selection import RobotSelection
 from server.memory.run_directory import RunDirectory
 from server.supervision.child_process import ChildProcess, describe_exit
 from server.supervision.stop_order import StopOrder
@@ -86,14 +87,9 @@ class Supervisor:
         self._audit = audit or AuditLog("supervisor", None)
         self._terminal = terminal or Terminal(None)
         self._wall_clock = WallClock()
-        control = configuration.control
-        create_mapped_files(directory.path, control.rate_hz, control.record_ring_seconds)
-        self._supervision = MappedSlot(
-            directory.path / SUPERVISION_FILE, SUPERVISION, writable=True
-        )
-        self._status = MappedSlot(directory.path / STATUS_FILE, STATUS)
-        self._record = MappedSlot(directory.path / RECORD_SLOT_FILE, RECORD)
-        self._stop_order = StopOrder(self._record)
+        self._directory, self._configuration = directory, configuration
+        self._selection = RobotSelection(directory.path)
+        self._make_files()
         # The writing end is inherited by nobody, so it closes with this process.
         lifeline, self._lifeline_end = os.pipe()
         common = ["--run-directory", str(directory.path), "--lifeline-fd", str(lifeline)]
@@ -135,6 +131,16 @@ class Supervisor:
         self._ending = False
         self._exit_status = 0
 
+    def _make_files(self) -> None:
+        """Make every mapped file, in the form that the configuration's robot has."""
+        path, configuration = self._directory.path, self._configuration
+        types, seconds = record_types_of(configuration), configuration.control.record_ring_seconds
+        create_mapped_files(path, configuration.rate_hz, seconds, types)
+        self._supervision = MappedSlot(path / SUPERVISION_FILE, SUPERVISION, writable=True)
+        self._status = MappedSlot(path / STATUS_FILE, STATUS)
+        self._record = MappedSlot(path / RECORD_SLOT_FILE, types.record)
+        self._stop_order = StopOrder(self._record)
+
     @staticmethod
     def _ask_for(directory: Path, record: Path | None) -> None:
         """Have the recorder begin with its first breath; later requests come from web."""
@@ -151,11 +157,7 @@ class Supervisor:
         """
         wake = self._catch_signals()
         try:
-            for child in (self._web, self._control, self._recorder, self._leader):
-                if child is not None:
-                    child.start()
-                    self._note_start(child)
-            self._mark(ControlState.STARTING)
+            self._start()
             while not self._ending:
                 self._wait(wake)
                 self._watch_control()
@@ -163,9 +165,37 @@ class Supervisor:
                 self._watch_beside(self._recorder, "the recorder")
                 self._watch_beside(self._leader, "the stylus' process")
                 self._watch_wall_clock()
+                self._watch_selection()
         finally:
             self._end()
+            os.close(self._lifeline_end)
         return self._exit_status
+
+    def _start(self) -> None:
+        for child in (self._web, self._control, self._recorder, self._leader):
+            if child is not None:
+                child.start()
+                self._note_start(child)
+        self._mark(ControlState.STARTING)
+
+    def _watch_selection(self) -> None:
+        """Start everything anew with another robot, where one was selected.
+
+        Records of another robot have another form: no process of before could read them.
+        """
+        robot = self._selection.take()
+        before = self._configuration.robot
+        if robot is None or robot == before:
+            return
+        say(f"the robot is changed from {before} to {robot}; everything starts anew, disabled")
+        self._audit.note("robot_selected", f"{robot} in place of {before}", robot=robot)
+        self._end()
+        self._configuration = self._configuration.model_copy(update={"robot": robot})
+        self._directory.change_robot(self._configuration)
+        self._make_files()
+        self._message, self._phase, self._has_run = "", Phase.STARTING, False
+        self._ticks = 0
+        self._start()
 
     def _note_start(self, child: ChildProcess) -> None:
         again = f" again ({child.restarts})" if child.restarts else ""
@@ -334,4 +364,3 @@ class Supervisor:
                 say(f"{name} did not end within {_PATIENCE_S:g} s and was ended by force")
         if not self._web.finish(_PATIENCE_S):
             say(f"web did not end within {_PATIENCE_S:g} s and was ended by force")
-        os.close(self._lifeline_end)

@@ -33,6 +33,8 @@ _ACTS = {
     ("PUT", "trocar/breathing"): "change the breathing",
     ("POST", "recording"): "start a recording",
     ("DELETE", "recording"): "stop the recording",
+    ("PUT", "method"): "change the method",
+    ("POST", "select"): "drive another robot",
     ("POST", "home"): "home the instrument",
     ("POST", "torque/release"): "release the torque",
     ("POST", "torque/hold"): "put torque on",

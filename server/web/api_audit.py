@@ -10,10 +10,9 @@ from fastapi import APIRouter, Query
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from server.audit.reader import MOST, newest
-from server.web.api_robot import ROBOT
 from server.web.services import AnyCaller, ServicesHere
 
-router = APIRouter(prefix=ROBOT, tags=["console"])
+router = APIRouter(tags=["console"])
 
 
 class AuditEntry(BaseModel):

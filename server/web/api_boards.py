@@ -9,10 +9,10 @@ from starlette.responses import Response
 
 from robot.errors import UnknownName
 from server.web.api_models import BoardChange, BoardEntry
-from server.web.api_robot import ROBOT, STATE
+from server.web.api_robot import STATE
 from server.web.services import Operator, ServicesHere
 
-router = APIRouter(prefix=ROBOT, tags=["boards"])
+router = APIRouter(tags=["boards"])
 
 
 @router.get("/boards", summary="The boards that can be put before the instrument")

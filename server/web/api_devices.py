@@ -11,13 +11,13 @@ from starlette.responses import Response
 from robot.errors import UnknownName
 from robot.records import Safety
 from server.web.api_models import Body
-from server.web.api_robot import ROBOT, STATE
+from server.web.api_robot import STATE
 from server.web.device_schema import DevicesPart
 from server.web.devices_view import devices_view
 from server.web.refusals import NotSimulated
 from server.web.services import AnyCaller, Operator, Services, ServicesHere
 
-router = APIRouter(prefix=ROBOT, tags=["devices"])
+router = APIRouter(tags=["devices"])
 
 _STILL = (Safety.DISABLED, Safety.PAUSED, Safety.FAULT)
 
@@ -25,7 +25,7 @@ _STILL = (Safety.DISABLED, Safety.PAUSED, Safety.FAULT)
 @router.get("/devices", summary="Servo bus and arm")
 async def devices(services: ServicesHere, _: AnyCaller) -> DevicesPart:
     """What has a wire: state, rates, loads, temperatures, voltages, errors in words."""
-    connected = services.configuration.hardware.connected
+    connected = services.configuration.drives_hardware
     return DevicesPart.model_validate(devices_view(services.link.devices(), connected))
 
 
@@ -79,32 +79,33 @@ class FaultInjection(Body):
 
 
 def _check_simulated(services: Services) -> None:
-    if services.configuration.hardware.connected:
+    if services.configuration.drives_hardware:
         raise NotSimulated
 
 
 @router.get("/faults", summary="Faults that a simulated robot can be given")
 async def faults(services: ServicesHere, _: AnyCaller) -> list[FaultEntry]:
     """Empty for a real robot."""
-    from hardware.faulty_plant import FAULTS
+    from hardware.faulty_plant import plant_faults
 
-    if services.configuration.hardware.connected:
+    if services.configuration.drives_hardware:
         return []
     active = services.requests.fault
     return [
         FaultEntry(name=name, title=fault.title, active=name == active)
-        for name, fault in FAULTS.items()
+        for name, fault in plant_faults(services.configuration.robot).items()
     ]
 
 
 @router.post("/faults", summary="Break the simulated robot", responses=STATE)
 async def inject(body: FaultInjection, services: ServicesHere, caller: Operator) -> Response:
     """It acts from the next tick on, in the place of the one before. 409 on a real robot."""
-    from hardware.faulty_plant import FAULTS
+    from hardware.faulty_plant import plant_faults
 
     _check_simulated(services)
-    if body.name not in FAULTS:
-        raise UnknownName("fault", body.name, tuple(FAULTS))
+    known = plant_faults(services.configuration.robot)
+    if body.name not in known:
+        raise UnknownName("fault", body.name, tuple(known))
     await services.requests.inject_fault(body.name)
     return services.state(caller)
 

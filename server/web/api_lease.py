@@ -7,11 +7,10 @@ from starlette.responses import Response
 
 from robot.records import Request, Safety
 from server.web.api_models import HandOver, LeaseGrant, LeaseRequest
-from server.web.api_robot import ROBOT
 from server.web.lease import Holder
 from server.web.services import AnyCaller, Operator, Services, ServicesHere
 
-router = APIRouter(prefix=f"{ROBOT}/lease", tags=["operator"])
+router = APIRouter(prefix="/lease", tags=["operator"])
 
 
 def _grant(services: Services, holder: Holder) -> LeaseGrant:

@@ -14,6 +14,8 @@ from pydantic import (
     model_validator,
 )
 
+from robot.concentric.design import MethodName
+
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Millimetres = Annotated[float, Field(strict=True, ge=-10_000, le=10_000, allow_inf_nan=False)]
 Component = Annotated[float, Field(strict=True, ge=-10, le=10, allow_inf_nan=False)]
@@ -71,6 +73,12 @@ class PriorityChange(Body):
     coordinates: Literal["uv", "polar"] | None = Field(
         None, description="Segment coordinates of the formulas; the QP always uses u, v."
     )
+
+
+class MethodChange(Body):
+    """How the redundancy of the concentric-tube arms is resolved."""
+
+    method: MethodName = Field(description="Takes effect with the next tick.", examples=["hqp"])
 
 
 class TeleoperationChange(Body):
@@ -208,6 +216,13 @@ class RobotEntry(BaseModel):
 
     name: str
     title: str
+    selected: bool = Field(description="Whether it is the one that is driven now.")
+
+
+class RobotSelected(BaseModel):
+    """The robot that is driven from now on."""
+
+    robot: str
 
 
 class ExperimentEntry(BaseModel):

@@ -1,4 +1,4 @@
-"""How the tip moves: priority, teleoperation, target and leader poses. For the operator only."""
+"""How the tip is led: teleoperation, target and leader poses. For the operator only."""
 
 from __future__ import annotations
 
@@ -8,44 +8,22 @@ import numpy as np
 from fastapi import APIRouter
 from starlette.responses import Response
 
-from robot.priority.levels import case_named
 from robot.rotations import matrix_from_quaternion
 from server.web.api_models import (
-    CompensationChange,
     LeaderAnswer,
     LeaderPose,
-    PriorityChange,
     TargetPose,
     TeleoperationChange,
 )
-from server.web.api_robot import ROBOT, STATE
+from server.web.api_robot import STATE
 from server.web.refusals import OutOfRange
 from server.web.services import Operator, Services, ServicesHere
-from server.web.state_message import ALIGNMENTS, COMPENSATIONS, COORDINATES, SOLVERS
+from server.web.state_message import ALIGNMENTS
 
-router = APIRouter(prefix=ROBOT, tags=["motion"])
+router = APIRouter(tags=["motion"])
 
-_SOLVER_OF = {name: solver for solver, name in SOLVERS.items()}
-_COORDINATES_OF = {name: coordinates for coordinates, name in COORDINATES.items()}
 _ALIGNMENT_OF = {name: alignment for alignment, name in ALIGNMENTS.items()}
-_COMPENSATION_OF = {name: mode for mode, name in COMPENSATIONS.items()}
 _METRES = 1e-3
-
-
-@router.put("/priority", summary="Choose what matters most", responses=STATE)
-async def priority(body: PriorityChange, services: ServicesHere, caller: Operator) -> Response:
-    """Takes effect with the next tick. What is left out stays as it is."""
-
-    def change(settings: Any) -> None:
-        if body.case is not None:
-            settings["case"] = case_named(body.case)
-        if body.solver is not None:
-            settings["solver"] = _SOLVER_OF[body.solver]
-        if body.coordinates is not None:
-            settings["coordinates"] = _COORDINATES_OF[body.coordinates]
-
-    await services.requests.settings(change)
-    return services.state(caller)
 
 
 @router.put("/teleoperation", summary="Choose how the leader is followed", responses=STATE)
@@ -70,22 +48,6 @@ async def teleoperation(
             settings["alignment"] = _ALIGNMENT_OF[body.alignment]
         if body.view_wxyz is not None:
             settings["rotation_base_leader"] = turned
-
-    await services.requests.settings(change)
-    return services.state(caller)
-
-
-@router.put("/compensation", summary="Choose how tendons and tracker are met", responses=STATE)
-async def compensation(
-    body: CompensationChange, services: ServicesHere, caller: Operator
-) -> Response:
-    """Takes effect smoothly from the next tick on. What is left out stays as it is."""
-
-    def change(settings: Any) -> None:
-        if body.mode is not None:
-            settings["compensation"] = _COMPENSATION_OF[body.mode]
-        if body.tracker is not None:
-            settings["use_tracker"] = body.tracker
 
     await services.requests.settings(change)
     return services.state(caller)

@@ -12,7 +12,7 @@ from starlette.responses import Response
 from robot.configuration import Configuration
 from robot.rotations import matrix_from_quaternion
 from server.web.api_models import ExperimentEntry, PathStart
-from server.web.api_robot import ROBOT, STATE
+from server.web.api_robot import STATE
 from server.web.refusals import BoardNeeded
 from server.web.services import Operator, Services, ServicesHere
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from scenes.experiments import Experiment
     from scenes.path import Path
 
-router = APIRouter(prefix=ROBOT, tags=["paths"])
+router = APIRouter(tags=["paths"])
 
 
 def list_experiments(configuration: Configuration) -> list[ExperimentEntry]:

@@ -12,10 +12,9 @@ from pydantic import BaseModel, Field
 from server.memory.recording_link import RecordingState, RecordingStatus
 from server.recording import folder
 from server.web.api_models import Body
-from server.web.api_robot import ROBOT
 from server.web.services import AnyCaller, ServicesHere
 
-router = APIRouter(prefix=ROBOT, tags=["recording"])
+router = APIRouter(tags=["recording"])
 
 
 class RecordingStart(Body):

@@ -13,7 +13,6 @@ from starlette.requests import HTTPConnection
 from server.memory.replay_link import ReplayLink
 from server.recording.replay_process import FASTEST, SLOWEST
 from server.web.api_models import Body, Flag, Number
-from server.web.api_robot import ROBOT
 from server.web.refusals import NoReplay, OnlyAReplay, ReplaySilent
 from server.web.services import AnyCaller, ServicesHere, services_of
 from server.web.state_message import replay_view
@@ -23,7 +22,7 @@ ANSWER_S = 2.0
 _POLL_S = 0.005
 _READING = ("GET", "HEAD")
 
-router = APIRouter(prefix=ROBOT, tags=["replay"])
+router = APIRouter(tags=["replay"])
 
 
 class ReplayChange(Body):

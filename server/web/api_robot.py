@@ -1,52 +1,85 @@
-"""What can be read: health, robots, state, configuration, transitions, dexterity."""
+"""The console and its robots: health, which robots there are, and what can be read of the one that
+is driven.
+"""
 
 from __future__ import annotations
 
-import asyncio
 from typing import Any
 
 from fastapi import APIRouter
 from starlette.responses import Response
 
-from robot.records import Case, Request
+from robot.configuration import RobotName
+from robot.records import Request, Safety
+from robot.robots import TITLES
 from robot.safety import REASONS, TRANSITIONS, Event
 from server.version import version
-from server.web.api_models import Health, RobotEntry, TransitionEntry
-from server.web.services import AnyCaller, ServicesHere
-from server.web.state_schema import StateMessage
+from server.web.api_models import Health, RobotEntry, RobotSelected, TransitionEntry
+from server.web.refusals import NotReady, OnlyAReplay
+from server.web.services import AnyCaller, Operator, ServicesHere
+from server.web.state_schema import ConcentricState, StateMessage
 
-ROBOT = "/api/v1/robots/instrument"
-STATE: dict[int | str, dict[str, Any]] = {200: {"model": StateMessage, "description": "The state."}}
+ROBOTS = "/api/v1/robots"
+STATE: dict[int | str, dict[str, Any]] = {
+    200: {"model": StateMessage | ConcentricState, "description": "The state."}
+}
 
-router = APIRouter()
+router = APIRouter(tags=["console"])
+robot_router = APIRouter(tags=["reading"])
 
 
-@router.get("/api/v1/health", tags=["console"], summary="Whether the server answers")
+def robot_path(robot: str) -> str:
+    """Path of everything that belongs to the robot of that name."""
+    return f"{ROBOTS}/{robot}"
+
+
+@router.get("/api/v1/health", summary="Whether the server answers")
 async def health(services: ServicesHere) -> Health:
     """Needs no token and tells nothing of the robot."""
     return Health(status="ok", version=version(), scene=services.scene())
 
 
-@router.get("/api/v1/robots", tags=["console"], summary="The robots of this console")
+@router.get(ROBOTS, summary="The robots of this console")
 async def robots(services: ServicesHere) -> list[RobotEntry]:
-    """One at a time can be driven."""
-    arm = services.configuration.arm.name
-    return [RobotEntry(name="instrument", title=f"continuum instrument on {arm}")]
+    """One at a time can be driven; the others can be selected."""
+    driven = services.configuration.robot
+    return [
+        RobotEntry(name=name, title=title, selected=name == driven)
+        for name, title in TITLES.items()
+    ]
 
 
-@router.get(f"{ROBOT}/state", tags=["reading"], summary="The newest state", responses=STATE)
+@router.post(f"{ROBOTS}/{{robot}}/select", status_code=202, summary="Drive another robot")
+async def select(robot: RobotName, services: ServicesHere, caller: Operator) -> RobotSelected:
+    """Ends the control process and starts it with the other robot, DISABLED.
+
+    The web process starts anew with it: connections close, and the lease is gone. 409 unless the
+    robot that is driven now is DISABLED. Selecting the one that is driven changes nothing.
+    """
+    if services.replay is not None:
+        raise OnlyAReplay
+    if robot != services.configuration.robot:
+        safety = services.source.safety()
+        # A control process that is down moves nothing, and may be down because of its robot.
+        if safety not in (Safety.DISABLED, None):
+            raise NotReady(safety.name, f"the robot is in {safety.name}: disable it first")
+        services.selection.ask(robot)
+    return RobotSelected(robot=robot)
+
+
+@robot_router.get("/state", summary="The newest state", responses=STATE)
 async def state(services: ServicesHere, caller: AnyCaller) -> Response:
     """Positions in mm and orientations as w, x, y, z in the base frame; angles in degrees."""
     return services.state(caller)
 
 
-@router.get(f"{ROBOT}/configuration", tags=["reading"], summary="The configuration in force")
+@robot_router.get("/configuration", summary="The configuration in force")
 async def configuration(services: ServicesHere) -> dict[str, Any]:
     """Every value with its unit in its name, as in the configuration file."""
     return services.configuration.model_dump(mode="json")
 
 
-@router.get(f"{ROBOT}/transitions", tags=["reading"], summary="The safety transition table")
+@robot_router.get("/transitions", summary="The safety transition table")
 async def transitions() -> list[TransitionEntry]:
     """What is not listed is refused and changes nothing."""
     requests = {int(request) for request in Request}
@@ -61,15 +94,3 @@ async def transitions() -> list[TransitionEntry]:
         )
         for row in TRANSITIONS
     ]
-
-
-@router.get(f"{ROBOT}/dexterity", tags=["reading"], summary="Dexterity where the tip is now")
-async def dexterity(services: ServicesHere) -> dict[str, Any]:
-    """The paper's measures (111)-(113) at the commanded configuration.
-
-    Raw, and projected onto what the present priority leaves free.
-    """
-    record = services.source.fresh_record()
-    x = record["outcome"]["report"]["x"][0].copy()
-    case = Case(int(record["input"]["settings"]["case"][0]))
-    return await asyncio.to_thread(services.dexterity.at, x, case)

@@ -6,11 +6,11 @@ from fastapi import APIRouter
 from starlette.responses import Response
 
 from robot.records import Request
-from server.web.api_robot import ROBOT, STATE
+from server.web.api_robot import STATE
 from server.web.refusals import HandingOver
 from server.web.services import AnyCaller, Operator, ServicesHere
 
-router = APIRouter(prefix=ROBOT, tags=["safety"], responses=STATE)
+router = APIRouter(tags=["safety"], responses=STATE)
 
 
 @router.post("/emergency-stop", summary="Stop all motion now")

@@ -17,7 +17,6 @@ from server.leaders.force import NO_FORCE
 from server.memory.stylus_records import STYLUS_COUNTS
 from server.web.access import Caller
 from server.web.access_guard import caller_of
-from server.web.api_robot import ROBOT
 from server.web.problems import problem_of
 from server.web.refusals import OnlyAReplay
 from server.web.services import Services, ServicesHere, services_of
@@ -67,7 +66,7 @@ class LeadersView(BaseModel):
     stylus: StylusView | None
 
 
-@router.get(f"{ROBOT}/leaders", tags=["reading"], summary="Leaders that are devices")
+@router.get("/leaders", tags=["reading"], summary="Leaders that are devices")
 async def leaders(services: ServicesHere) -> LeadersView:
     """Connection, rate, age and faults of the stylus."""
     status = services.stylus.status()
@@ -173,7 +172,7 @@ _EVERY = 10
 _BOOLEAN = {False: "false", True: "true"}
 
 
-@router.websocket(f"{ROBOT}/leaders/stylus")
+@router.websocket("/leaders/stylus")
 async def stylus(websocket: WebSocket) -> None:
     """Samples in, forces out; see the guide for labs."""
     await websocket.accept()

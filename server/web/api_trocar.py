@@ -17,11 +17,11 @@ from scenes.trocar_motion import Breathing
 from scenes.withdrawal import Withdrawal
 from server.memory.link_records import TrocarSource
 from server.web.api_models import BreathingChange, TrocarEntry, TrocarRegistration
-from server.web.api_robot import ROBOT, STATE
+from server.web.api_robot import STATE
 from server.web.control_requests import check_enabled, check_free
 from server.web.services import Operator, Services, ServicesHere
 
-router = APIRouter(prefix=ROBOT, tags=["trocar"])
+router = APIRouter(tags=["trocar"])
 
 _METRES = 1e-3
 _LOCKS = ("lock_rotation", "lock_translation", "lock_arm")

@@ -17,14 +17,17 @@ from server.web import (
     api_boards,
     api_devices,
     api_lease,
+    api_method,
     api_motion,
     api_paths,
+    api_priority,
     api_recording,
     api_replay,
     api_robot,
     api_safety,
     api_stylus,
     api_trocar,
+    other_robots,
     problems,
     stream,
 )
@@ -33,6 +36,22 @@ from server.web.access_guard import AccessGuard
 from server.web.page_files import add_page, describe
 from server.web.services import make_services
 from server.web.viser_proxy import ViserAddress, viser_router
+
+_OWN_PARTS = {
+    "instrument": (api_priority, api_trocar, api_boards),
+    "concentric": (api_method,),
+}
+
+
+def _include_robot(app: FastAPI, robot: str) -> None:
+    """Everything below the path of the robot of that name."""
+    prefix = api_robot.robot_path(robot)
+    shared = (api_lease, api_safety, api_motion, api_paths, api_devices, api_recording)
+    routers = [api_robot.robot_router, *(part.router for part in shared + _OWN_PARTS[robot])]
+    for router in routers:
+        app.include_router(router, prefix=prefix, dependencies=[api_replay.RobotOnly])
+    for part in (api_audit, api_replay, api_stylus, stream):
+        app.include_router(part.router, prefix=prefix)
 
 
 def create_app(
@@ -80,14 +99,9 @@ def create_app(
     app.state.services = services
     app.add_middleware(AccessGuard, access=access, events=services.events)
     problems.install(app)
-    for part in (api_robot, api_lease, api_safety, api_motion, api_paths, api_trocar, api_boards):
-        app.include_router(part.router, dependencies=[api_replay.RobotOnly])
-    app.include_router(api_devices.router, dependencies=[api_replay.RobotOnly])
-    app.include_router(api_audit.router)
-    app.include_router(api_recording.router, dependencies=[api_replay.RobotOnly])
-    app.include_router(api_replay.router)
-    app.include_router(api_stylus.router)
-    app.include_router(stream.router)
+    app.include_router(api_robot.router)
+    _include_robot(app, configuration.robot)
+    app.include_router(other_robots.router(configuration.robot))
     app.include_router(viser_router(viser_address))
     add_page(app)
     describe(app)

@@ -18,7 +18,6 @@ from server.memory.link_records import TrocarSource
 from server.web.devices_view import readiness_view
 from server.web.refusals import ControlSilent, DevicesNotReady, NotReady
 from server.web.state_source import StateSource
-from server.web.trocar_view import TrocarView
 
 ANSWER_S = 1.0
 """How long control may take to answer before the caller is told that it does not."""
@@ -30,7 +29,7 @@ _BOARD_S = 5.0
 
 
 def safety_of(record: NDArray[Any]) -> Safety:
-    """The safety state in a (1,) RECORD."""
+    """The safety state in a (1,) record."""
     return Safety(int(record["outcome"]["state"]["safety"][0]))
 
 
@@ -40,11 +39,13 @@ class ControlRequests:
     Args:
         link: to the control process.
         source: of the newest record.
-        trocar: how the shaft stands to the trocar.
+        check_stand: refuses to enable a robot that stands wrong, by its (1,) record.
     """
 
-    def __init__(self, link: WebLink, source: StateSource, trocar: TrocarView) -> None:
-        self._link, self._source, self._trocar = link, source, trocar
+    def __init__(
+        self, link: WebLink, source: StateSource, check_stand: Callable[[NDArray[Any]], None]
+    ) -> None:
+        self._link, self._source, self._check_stand = link, source, check_stand
         self._settings_lock = asyncio.Lock()
         self._fault = ("", 0)
 
@@ -63,7 +64,7 @@ class ControlRequests:
         check_request(before, request)
         if request == Request.ENABLE:
             check_ready(record)
-            self._trocar.check_inserted(record)
+            self._check_stand(record)
         record = await self._taken_in(self._link.request(request))
         wanted, after = successor(before, Event(request)), safety_of(record)
         if after != wanted:
@@ -84,15 +85,16 @@ class ControlRequests:
         """Change the operator's choices.
 
         Args:
-            change: sets fields of a SETTINGS record; what it leaves alone stays as it is.
+            change: sets fields of the settings; what it leaves alone stays as it is.
 
         Raises:
             ControlSilent: control does not answer.
         """
         async with self._settings_lock:
             settings = self._source.fresh_record()["input"]["settings"].copy()
-            # The arm is locked by the path that plays, and no longer than it plays.
-            settings["lock_arm"] = 0
+            if "lock_arm" in (settings.dtype.names or ()):
+                # The arm is locked by the path that plays, and no longer than it plays.
+                settings["lock_arm"] = 0
             change(settings[0])
             await self._taken_in(self._link.settings(settings))
 

@@ -20,6 +20,7 @@ import uvicorn
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from robot.errors import KeyholeError
+from robot.record_types import record_types_of
 from server.audit.writer import AuditLog
 from server.control.lifeline import end_with_supervisor
 from server.control.realtime import prefer
@@ -73,9 +74,10 @@ def load_the_rest(services: Services) -> None:
     """Load what else the first request for it would wait for, and everyone else with it."""
     try:
         list_experiments(services.configuration)
-        services.dexterity.load()
-        services.trocar.load()
-        services.source.load_boards()
+        if services.configuration.robot == "instrument":
+            services.dexterity.load()
+            services.trocar.load()
+        services.source.load()
     except Exception:
         # Whoever asks for it will be told what is wrong with it.
         logging.getLogger("keyhole.web").exception("loading in advance failed")
@@ -90,7 +92,7 @@ def serve(directory: RunDirectory, listener: socket.socket) -> None:
     configuration, console = directory.configuration(), directory.console()
     hours = configuration.server.session_hours
     access = Access(directory.token(), str(console["host"]), hours)
-    link = WebLink(directory.path)
+    link = WebLink(directory.path, record_types_of(configuration))
     audit = AuditLog.of_console("web", directory.path)
     scene = SceneServer(configuration, link)
     app = create_app(configuration, link, access, scene.address, scene.state, audit)

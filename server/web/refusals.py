@@ -266,6 +266,25 @@ class NotSimulated(WebRefusal):
         super().__init__("this robot is real: it is not broken on purpose")
 
 
+class RobotNotSelected(WebRefusal):
+    """This console drives another robot now.
+
+    Attributes:
+        asked: the robot that the request is for.
+        driven: the one that is driven.
+    """
+
+    code = "robot_not_selected"
+    status = 409
+
+    def __init__(self, asked: str, driven: str) -> None:
+        super().__init__(
+            f"this console drives the robot {driven!r} now; disable it, then "
+            f"POST /api/v1/robots/{asked}/select, to drive {asked!r}"
+        )
+        self.asked, self.driven = asked, driven
+
+
 class TrocarRefused(WebRefusal):
     """The shaft cannot be meant to go through a trocar at this place.
 

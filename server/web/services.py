@@ -15,6 +15,7 @@ from server.audit.writer import AuditLog
 from server.memory.link import WebLink
 from server.memory.recording_link import RecordingLink
 from server.memory.replay_link import ReplayLink
+from server.memory.robot_selection import RobotSelection
 from server.web.access import Access, Caller
 from server.web.access_guard import caller_of
 from server.web.api_leaders import PoseLeader, TargetLeader
@@ -51,6 +52,7 @@ class Services:
         trocar: how the shaft stands to the trocar.
         recordings: to the recorder process.
         replay: to the process that shows a recording; None where there is a robot.
+        selection: of another robot, for the supervisor.
         scene: ``loading``, ``ready``, or why there is no scene.
     """
 
@@ -70,11 +72,16 @@ class Services:
     trocar: TrocarView
     recordings: Recordings
     replay: ReplayLink | None
+    selection: RobotSelection
     scene: Callable[[], str]
 
     def state(self, caller: Caller) -> Response:
         """The state message as ``caller`` sees it, as a response."""
         return Response(self.source.text(caller), media_type="application/json")
+
+
+def _stands_right(_: object) -> None:
+    """A robot without a trocar stands right wherever it stands."""
 
 
 def make_services(
@@ -92,6 +99,7 @@ def make_services(
     target = TargetLeader(link, source, configuration)
     pose = PoseLeader(link, source, configuration)
     trocar = TrocarView(configuration)
+    through_trocar = configuration.robot == "instrument"
     events = WebEvents(audit, lease)
     return Services(
         configuration,
@@ -100,7 +108,7 @@ def make_services(
         events,
         lease,
         source,
-        ControlRequests(link, source, trocar),
+        ControlRequests(link, source, trocar.check_inserted if through_trocar else _stands_right),
         target,
         pose,
         StylusBridge(link, lease, configuration),
@@ -110,6 +118,7 @@ def make_services(
         trocar,
         Recordings(recorder),
         replay,
+        RobotSelection(link.directory),
         scene,
     )
 

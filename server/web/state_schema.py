@@ -9,6 +9,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from robot.concentric.design import MethodName
 from server.web.device_schema import ClearancePart, DevicesPart, ReadinessPart
 
 Millimetres = list[float | None]
@@ -161,12 +162,11 @@ class ReplayPart(Part):
     cut: bool = Field(description="Whether the recording was cut off.")
 
 
-class StateMessage(Part):
-    """Everything about the robot at one tick. Positions and poses in the base frame."""
+class SharedState(Part):
+    """What is told of every robot at one tick. Positions and poses in the base frame."""
 
     type: Literal["state"]
     schema_version: Literal[1]
-    robot: Literal["instrument"]
     tick: int | None
     time_s: float | None = Field(description="The plant's clock, s.")
     age_ms: float | None = Field(description="Since the record was published, ms.")
@@ -175,8 +175,28 @@ class StateMessage(Part):
     engaged: bool
     leader: Literal["none", "gizmo", "api_pose", "api_target", "path", "stylus", "gamepad"]
     hold: bool
-    priority: PriorityPart
     teleoperation: TeleoperationPart
+    desired: PosePart
+    commanded: PosePart
+    true: PosePart
+    limits: list[str] = Field(description="Limits that hold the motion back, in words.")
+    loop: LoopPart
+    path: PathPart | None
+    plant: str
+    preset: str | None = Field(description="Of the simulated robot; null for the kinematic one.")
+    seed: int | None = Field(description="Likewise.")
+    readiness: ReadinessPart
+    devices: DevicesPart
+    recording: bool
+    replay: ReplayPart | None = Field(description="Null where there is a robot.")
+    control: Literal["running", "starting", "down"]
+
+
+class StateMessage(SharedState):
+    """The instrument on its arm."""
+
+    robot: Literal["instrument"]
+    priority: PriorityPart
     errors: ErrorsPart
     lambda_: LambdaPart = Field(alias="lambda")
     bend_deg: float | None
@@ -185,9 +205,6 @@ class StateMessage(Part):
     joints_deg: list[float | None] = Field(min_length=7, max_length=7)
     joint_limits_deg: list[list[float | None]] = Field(min_length=7, max_length=7)
     servos_deg: list[float | None] = Field(min_length=4, max_length=4)
-    desired: PosePart
-    commanded: PosePart
-    true: PosePart
     trocar_mm: Millimetres = Field(min_length=3, max_length=3)
     trocar: TrocarPart
     clearance: ClearancePart
@@ -198,15 +215,48 @@ class StateMessage(Part):
     rings: RingsPart | None = Field(description="Null without rings.")
     ball: BallPart | None = Field(description="Null without a ball.")
     residuals: ResidualsPart
-    limits: list[str] = Field(description="Limits that hold the motion back, in words.")
-    loop: LoopPart
-    path: PathPart | None
-    plant: str
-    preset: str | None = Field(description="Of the simulated robot; null for the kinematic one.")
-    seed: int | None = Field(description="Likewise.")
     board: str = Field(description="Name of the board before the instrument.")
-    readiness: ReadinessPart
-    devices: DevicesPart
-    recording: bool
-    replay: ReplayPart | None = Field(description="Null where there is a robot.")
-    control: Literal["running", "starting", "down"]
+
+
+class RelativeErrorsPart(Part):
+    """Desired minus true: of A's tip, and of B's tip from its place beside A's."""
+
+    position_mm: float | None
+    relative_mm: float | None
+    source: Literal["true", "measured"]
+
+
+class TubeArmPart(Part):
+    """One arm; a number for each tube, the innermost first."""
+
+    name: Literal["A", "B"]
+    translations_mm: list[float | None] = Field(
+        description="Where each tube's rear end stands behind the endoscope's face, as commanded."
+    )
+    translations_measured_mm: list[float | None]
+    lower_mm: list[float | None] = Field(description="Bounds that move with the tube inside.")
+    upper_mm: list[float | None]
+    rotations_deg: list[float | None]
+    stability: float | None = Field(description="1 far from snapping, 0 where the tubes snap.")
+
+
+class TaskScalePart(Part):
+    """Share of each task that the method carried out (``snsqp`` scales tasks; others do not)."""
+
+    relative: float | None
+    tracking: float | None
+
+
+class ConcentricState(SharedState):
+    """Two concentric-tube arms: the led tip is A's."""
+
+    robot: Literal["concentric"]
+    method: MethodName
+    errors: RelativeErrorsPart
+    relative_limit_mm: float = Field(description="More than this pauses the motion.")
+    stability_limit: float = Field(description="Less than this is not approached.")
+    desired_b_mm: Millimetres = Field(min_length=3, max_length=3)
+    commanded_b: PosePart
+    true_b: PosePart
+    arms: list[TubeArmPart] = Field(min_length=2, max_length=2)
+    task_scale: TaskScalePart

@@ -21,7 +21,8 @@ from server.memory.replay_link import ReplayLink
 from server.web.access import Caller
 from server.web.lease import Lease
 from server.web.refusals import ControlSilent
-from server.web.state_message import OperatorView, StateMessages, Surroundings
+from server.web.robot_messages import messages_of
+from server.web.state_message import OperatorView, Surroundings
 
 SILENT_NS = 1_000_000_000
 """Control counts as down when its newest record is older."""
@@ -39,7 +40,7 @@ class LoopMeter:
         self._seen: deque[tuple[int, int, int]] = deque()
 
     def take(self, record: NDArray[Any]) -> None:
-        """Take a record in, (1,) RECORD."""
+        """Take a (1,) record in."""
         header = record["header"][0]
         stamp, now = int(header["stamp_ns"]), (int(header["tick"]), int(header["time_ns"]))
         seen = self._seen
@@ -86,7 +87,7 @@ class StateSource:
     ) -> None:
         self._recorder, self._replay, self._records = recorder, replay, False
         self._link, self._lease, self._clock_ns = link, lease, clock_ns
-        self._messages = StateMessages(configuration)
+        self._messages = messages_of(configuration)
         self._meter = LoopMeter()
         self._status: dict[str, Any] = {}
         self._devices = np.zeros(1, DEVICES)
@@ -141,9 +142,9 @@ class StateSource:
         self._texts.clear()
         self._status_at = -_STATUS_NS
 
-    def load_boards(self) -> None:
-        """Find out about every board, which the first message with it would wait for."""
-        self._messages.load_boards()
+    def load(self) -> None:
+        """Find out about what the first message would wait for."""
+        self._messages.load()
 
     def _message(self, you: bool) -> dict[str, Any]:
         record = self.record()

@@ -21,7 +21,7 @@ from robot.errors import KeyholeError
 from server.web.access_guard import caller_of
 from server.web.api_models import Body, Flag, LeaderPose
 from server.web.api_motion import pass_on
-from server.web.api_robot import ROBOT
+from server.web.api_robot import robot_path
 from server.web.events import Asked
 from server.web.operator_watch import Presence
 from server.web.problems import problem_of
@@ -224,7 +224,8 @@ class StreamClient:
     def _note(self, refusal: KeyholeError) -> None:
         if isinstance(refusal, NotTheOperator):
             address = self._websocket.client.host if self._websocket.client else "unknown"
-            asked = Asked("POST", f"{ROBOT}/leader", address, self._caller)
+            path = robot_path(services_of(self._websocket).configuration.robot)
+            asked = Asked("POST", f"{path}/leader", address, self._caller)
             self._services.events.refused(asked, refusal)
 
     def _take(self, message: Incoming, presence: Presence) -> None:
@@ -252,7 +253,7 @@ class StreamClient:
                 pass_on(message, services)
 
 
-@router.websocket(f"{ROBOT}/stream")
+@router.websocket("/stream")
 async def stream(
     websocket: WebSocket,
     rate_hz: Annotated[float, Query(ge=0.1, le=120, allow_inf_nan=False)] = 30.0,

@@ -93,7 +93,7 @@ class StylusBridge:
         self._file = StylusStatusFile(link.directory)
         if self._elsewhere:
             return
-        self._view = ControlView(link.directory)
+        self._view = ControlView(link.directory, link.types)
         self._stylus = StylusInput(LeaderSlot(link.directory, LeaderKind.STYLUS), stylus)
         self._spring = SpringForce(stylus, self._view)
         self._report = StylusReport("this console's own WebSocket")

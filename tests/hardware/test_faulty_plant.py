@@ -17,7 +17,7 @@ from robot.records import Request, Safety
 from robot.safety import Event
 from scenes.path import Path
 from server.configuration_file import load
-from server.control.loop import ControlLoop
+from server.control.instrument_loop import InstrumentLoop
 
 EXPECTED = {
     "measurement-lost": (Safety.FAULT, Event.MEASUREMENT_LOST),
@@ -61,9 +61,11 @@ def far_and_turned() -> Path:
     return Path(samples, "far")
 
 
-def driven(robot: InstrumentRobot, configuration: Configuration) -> tuple[ControlLoop, FaultyPlant]:
+def driven(
+    robot: InstrumentRobot, configuration: Configuration
+) -> tuple[InstrumentLoop, FaultyPlant]:
     plant = FaultyPlant(KinematicPlant(configuration, robot.initial_state()["x"][0]))
-    loop = ControlLoop(robot, plant, configuration)
+    loop = InstrumentLoop(robot, plant, configuration)
     loop.request = Request.ENABLE
     loop.step()
     loop.start_path(far_and_turned())

@@ -19,7 +19,7 @@ from robot.instrument_robot import InstrumentRobot
 from robot.records import Request, Safety
 from robot.safety import Event
 from scenes.boards.board import board
-from server.control.loop import ControlLoop
+from server.control.instrument_loop import InstrumentLoop
 from tests import own_kinematics
 from tests.hardware import physics_robot as here
 
@@ -316,7 +316,7 @@ def test_a_blow_up_is_a_fault_of_the_loop(
     under = here.configuration("paper")
     robot = InstrumentRobot(under)
     plant = PhysicsPlant(under, here.start(), here.NO_BOARD)
-    loop = ControlLoop(robot, plant, under)
+    loop = InstrumentLoop(robot, plant, under)
     loop.request = request_first
     for _ in range(5):
         loop.step()

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from robot.instrument_robot import InstrumentRobot
 from robot.records import INPUT, OUTCOME, LeaderKind, Request, Safety
 from robot.tendons import servo_angles
-from server.control.loop import default_settings
+from server.control.instrument_loop import default_settings
 
 DT = 0.002
 

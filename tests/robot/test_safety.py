@@ -52,6 +52,8 @@ EXPECTED: dict[Event, dict[Safety, Safety]] = {
     Event.CLEARANCE: {E: P},
     Event.TROCAR_LEFT: {E: F},
     Event.CONTROL_LATE: {E: P},
+    Event.NEAR_SNAPPING: {E: P},
+    Event.RELATIVE_ERROR: {E: P},
 }
 EVERYTHING = list(itertools.product(Safety, Event))
 

@@ -11,10 +11,12 @@ import httpx
 from websockets.sync.client import ClientConnection, connect
 from websockets.sync.connection import Connection
 
-from server.web.api_robot import ROBOT
+from server.web.api_robot import robot_path
 from tests.server.console_process import ConsoleProcess, eventually
 
 JSON = dict[str, Any]
+
+ROBOT = robot_path("instrument")
 
 
 class ApiClient:

@@ -16,7 +16,7 @@ from robot.instrument_robot import InstrumentRobot
 from robot.records import LeaderKind, Request
 from scenes.experiments import experiment
 from server.configuration_file import load
-from server.control.loop import ControlLoop
+from server.control.instrument_loop import InstrumentLoop
 from server.recording.writer import RecordingWriter
 
 Records = NDArray[Any]
@@ -31,7 +31,7 @@ class Session:
         configuration = load()
         robot = InstrumentRobot(configuration, CALIBRATION)
         plant = KinematicPlant(configuration, robot.initial_state()["x"][0])
-        self.loop = ControlLoop(robot, plant, configuration)
+        self.loop = InstrumentLoop(robot, plant, configuration)
         self.loop.hold = 1
         self.records: list[Records] = []
 

@@ -11,10 +11,9 @@ from websockets.exceptions import InvalidStatus
 
 from server.web.access import COOKIE, Access, names_of
 from server.web.access_guard import LARGEST_BODY
-from server.web.api_robot import ROBOT
 from server.web.page_headers import headers_for
 from server.web.refusals import ForeignHost, ForeignOrigin, NotAdmitted
-from tests.server.api_client import ApiClient, problem_in
+from tests.server.api_client import ROBOT, ApiClient, problem_in
 from tests.server.console_process import ConsoleProcess
 
 TOKEN = "a-token-for-this-test"

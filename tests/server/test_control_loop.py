@@ -10,7 +10,7 @@ from robot.instrument_robot import InstrumentRobot
 from robot.records import LeaderKind, Request, Safety
 from scenes.path import Path
 from server.configuration_file import load
-from server.control.loop import ControlLoop
+from server.control.instrument_loop import InstrumentLoop
 
 
 @pytest.fixture(scope="module")
@@ -19,10 +19,10 @@ def robot() -> InstrumentRobot:
 
 
 @pytest.fixture
-def loop(robot: InstrumentRobot) -> ControlLoop:
+def loop(robot: InstrumentRobot) -> InstrumentLoop:
     """An enabled loop on the kinematic plant."""
     x = robot.initial_state()["x"][0]
-    loop = ControlLoop(robot, KinematicPlant(robot.configuration, x), robot.configuration)
+    loop = InstrumentLoop(robot, KinematicPlant(robot.configuration, x), robot.configuration)
     loop.request = Request.ENABLE
     loop.step()
     return loop
@@ -36,11 +36,11 @@ def straight_path(millimetres: float, seconds: float) -> Path:
     return Path(rows, "straight")
 
 
-def safety(loop: ControlLoop) -> Safety:
+def safety(loop: InstrumentLoop) -> Safety:
     return Safety(int(loop.record["outcome"]["state"]["safety"][0]))
 
 
-def leave_an_old_sample(loop: ControlLoop) -> None:
+def leave_an_old_sample(loop: InstrumentLoop) -> None:
     """The newest sample of a leader that stopped long ago, its clutch open."""
     loop.leader["kind"] = LeaderKind.API_POSE
     loop.leader["clutch"] = 0
@@ -49,7 +49,7 @@ def leave_an_old_sample(loop: ControlLoop) -> None:
     loop.leader["wxyz"] = (1.0, 0.0, 0.0, 0.0)
 
 
-def test_the_end_of_a_path_is_not_a_stale_leader(loop: ControlLoop) -> None:
+def test_the_end_of_a_path_is_not_a_stale_leader(loop: InstrumentLoop) -> None:
     leave_an_old_sample(loop)
     loop.start_path(straight_path(1.0, 0.1))
     for _ in range(100):
@@ -58,7 +58,7 @@ def test_the_end_of_a_path_is_not_a_stale_leader(loop: ControlLoop) -> None:
     assert safety(loop) == Safety.ENABLED
 
 
-def test_stopping_a_path_is_not_a_stale_leader(loop: ControlLoop) -> None:
+def test_stopping_a_path_is_not_a_stale_leader(loop: InstrumentLoop) -> None:
     leave_an_old_sample(loop)
     loop.start_path(straight_path(5.0, 1.0))
     for _ in range(20):
@@ -71,7 +71,7 @@ def test_stopping_a_path_is_not_a_stale_leader(loop: ControlLoop) -> None:
 
 
 @pytest.mark.parametrize("request_", [Request.PAUSE, Request.DISABLE, Request.EMERGENCY_STOP])
-def test_a_path_does_not_outlive_the_enabled_state(loop: ControlLoop, request_: Request) -> None:
+def test_a_path_does_not_outlive_the_enabled_state(loop: InstrumentLoop, request_: Request) -> None:
     loop.start_path(straight_path(5.0, 1.0))
     for _ in range(20):
         loop.step()
@@ -89,7 +89,7 @@ def test_a_path_does_not_outlive_the_enabled_state(loop: ControlLoop, request_: 
 
 
 def test_the_errors_of_a_path_are_against_the_path_where_speed_limits_make_the_tip_lag(
-    loop: ControlLoop,
+    loop: InstrumentLoop,
 ) -> None:
     loop.start_path(straight_path(40.0, 0.4))
     steps = 100
@@ -117,6 +117,6 @@ def test_an_arm_that_is_locked_is_not_asked_to_move(connected: bool, arm: str, l
     configuration = configuration.model_copy(update={"hardware": hardware})
     robot = InstrumentRobot(configuration)
     x = robot.initial_state()["x"][0]
-    loop = ControlLoop(robot, KinematicPlant(configuration, x), configuration)
+    loop = InstrumentLoop(robot, KinematicPlant(configuration, x), configuration)
     loop.step()
     assert loop.record["input"]["settings"]["lock_arm"][0] == locked

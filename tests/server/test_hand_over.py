@@ -8,10 +8,9 @@ import httpx
 import pytest
 
 from server.web.access import Caller
-from server.web.api_robot import ROBOT
 from server.web.lease import WISH_S, Lease
 from server.web.refusals import AlreadyAsked, LeaseHeld, NobodyToAsk, NotTheOperator
-from tests.server.api_client import JSON, ApiClient, problem_in
+from tests.server.api_client import JSON, ROBOT, ApiClient, problem_in
 from tests.server.console_process import ConsoleProcess
 
 ADA, GRACE, EVE = Caller("ada", None), Caller("grace", None), Caller("eve", None)

@@ -15,7 +15,7 @@ from scenes.experiments import experiment
 from scenes.path import Path
 from scenes.trocar_motion import Breathing
 from server.configuration_file import load
-from server.control.loop import ControlLoop
+from server.control.instrument_loop import InstrumentLoop
 from server.control.trocar import FARTHEST_M
 from server.memory.link_records import TrocarSource
 from server.web.api_trocar import withdrawal_of
@@ -28,28 +28,28 @@ def robot() -> InstrumentRobot:
     return InstrumentRobot(load())
 
 
-def standing(robot: InstrumentRobot) -> ControlLoop:
+def standing(robot: InstrumentRobot) -> InstrumentLoop:
     """A disabled loop on the kinematic plant."""
     plant = KinematicPlant(robot.configuration, robot.initial_state()["x"][0])
-    loop = ControlLoop(robot, plant, robot.configuration)
+    loop = InstrumentLoop(robot, plant, robot.configuration)
     loop.step()
     return loop
 
 
-def ask(loop: ControlLoop, request: Request) -> Safety:
+def ask(loop: InstrumentLoop, request: Request) -> Safety:
     loop.request = request
     loop.step()
     return loop.safety
 
 
-def enabled(robot: InstrumentRobot, case: Case = Case.LINEAR_FIRST) -> ControlLoop:
+def enabled(robot: InstrumentRobot, case: Case = Case.LINEAR_FIRST) -> InstrumentLoop:
     loop = standing(robot)
     loop.settings["case"] = case
     assert ask(loop, Request.ENABLE) == Safety.ENABLED
     return loop
 
 
-def run(loop: ControlLoop, seconds: float) -> np.ndarray:
+def run(loop: InstrumentLoop, seconds: float) -> np.ndarray:
     """(n, 3) RCM error, distance of the tip from where it was, and lambda, in every tick."""
     tip = loop.record["truth"]["position"][0].copy()
     rows = []

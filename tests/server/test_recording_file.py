@@ -17,7 +17,7 @@ from mcap.stream_reader import StreamReader
 
 from robot.records import RECORD
 from server.configuration_file import load
-from server.recording.channels import JSON_CHANNELS, RATE_HZ
+from server.recording.channels import RATE_HZ, json_channels
 from server.recording.errors import NotARecording, RecordingEmpty, RecordingNotWritten
 from server.recording.reader import Recording
 from server.recording.record_type import describe, understand
@@ -101,7 +101,11 @@ def test_the_formats_own_reader_reads_it(path: Path) -> None:
         assert summary is not None
         assert summary.statistics is not None
         topics = {channel.topic: number for number, channel in summary.channels.items()}
-        assert set(topics) == {"/records", "/gaps", *(one.topic for one in JSON_CHANNELS)}
+        assert set(topics) == {
+            "/records",
+            "/gaps",
+            *(one.topic for one in json_channels("instrument")),
+        }
         counts = summary.statistics.channel_message_counts
         assert counts[topics["/records"]] == len(recorded_run())
         messages = [
@@ -133,7 +137,7 @@ def fits(value: Any, schema: dict[str, Any]) -> bool:
 def test_plots_come_fifty_times_a_second_as_their_schemas_say(path: Path) -> None:
     step = round(load().control.rate_hz / RATE_HZ)
     truth = recorded_run()["truth"][::step]
-    for one in JSON_CHANNELS:
+    for one in json_channels("instrument"):
         with path.open("rb") as file:
             found = [
                 (schema, json.loads(message.data))

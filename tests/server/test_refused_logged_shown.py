@@ -14,9 +14,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from server.web.access import COOKIE, Access, Caller
-from server.web.api_robot import ROBOT
 from server.web.refusals import NotAdmitted, SessionExpired
-from tests.server.api_client import JSON, ApiClient, problem_in
+from tests.server.api_client import JSON, ROBOT, ApiClient, problem_in
 from tests.server.console_process import ConsoleProcess, eventually
 
 EVIL = "http://evil.example"

@@ -25,6 +25,7 @@ from robot.records import (
 )
 from robot.safety import REASONS, Event
 from server.configuration_file import load
+from server.web.instrument_message import InstrumentMessages
 from server.web.state_message import OperatorView, StateMessages, Surroundings
 from server.web.state_schema import StateMessage
 from server.web.state_source import LoopMeter
@@ -41,7 +42,7 @@ def configuration() -> Configuration:
 
 @pytest.fixture(scope="module")
 def messages(configuration: Configuration) -> StateMessages:
-    return StateMessages(configuration)
+    return InstrumentMessages(configuration)
 
 
 @pytest.fixture

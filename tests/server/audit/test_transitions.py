@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot.records import RECORD, Safety
+from robot.records import INSTRUMENT, RECORD, Safety
 from robot.safety import TRANSITIONS, Event
 from server.audit.reader import newest
 from server.audit.transitions import STATE_CHANGED, TransitionWatch
@@ -33,7 +33,7 @@ class Watched:
 
     def _start(self) -> None:
         self._log = AuditLog("recorder", self.where, "1")
-        self._watch = TransitionWatch(self._folder, self._log)
+        self._watch = TransitionWatch(self._folder, self._log, INSTRUMENT)
 
     def step(self) -> None:
         self._watch.step()

@@ -17,8 +17,7 @@ from websockets.exceptions import ConnectionClosed
 
 from robot.records import Safety
 from server.memory.mapped import MappedRing
-from server.web.api_robot import ROBOT
-from tests.server.api_client import ApiClient
+from tests.server.api_client import ROBOT, ApiClient
 from tests.server.console_process import ConsoleProcess
 from tests.server.fuzz.json_values import ANY_JSON, SPECIAL, bodies
 

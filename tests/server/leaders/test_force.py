@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from robot.configuration import Stylus
-from robot.records import LeaderKind, Safety
+from robot.records import INSTRUMENT, LeaderKind, Safety
 from robot.rotations import exponential
 from server.leaders.control_view import SILENT_NS, ControlView
 from server.leaders.force import NO_FORCE, ONSET_S, SpringForce
@@ -19,7 +19,7 @@ LATER = 10_000_000_000
 
 @pytest.fixture
 def view(control: ControlSide) -> ControlView:
-    return ControlView(control.directory)
+    return ControlView(control.directory, INSTRUMENT)
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from robot.configuration import Configuration, Stylus
-from robot.records import DriveMode, Safety
+from robot.records import INSTRUMENT, DriveMode, Safety
 from server.leaders.connection import ConnectionFailed, connect
 from server.leaders.process import StylusLeader
 from server.leaders.status import StylusStatusFile
@@ -29,7 +29,7 @@ class Bench:
 
     def __init__(self, fake: RunningStylus, control: ControlSide, configuration: Stylus) -> None:
         self.fake, self.control = fake, control
-        self.leader = StylusLeader(control.directory, configuration)
+        self.leader = StylusLeader(control.directory, configuration, INSTRUMENT)
         self.status = StylusStatusFile(control.directory)
         self._ending = threading.Event()
         self.safety, self.engaged, self.told_invalid = Safety.ENABLED, False, False

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robot.configuration import Stylus
-from robot.records import DriveMode, Safety
+from robot.records import INSTRUMENT, DriveMode, Safety
 from server.leaders.control_view import ControlView
 from server.leaders.stylus_input import StylusInput
 from tests.server.leaders.conftest import ControlSide
@@ -227,7 +227,7 @@ def test_a_driver_that_tells_changes_leads_with_its_first_press(
 def test_what_is_known_of_control(
     control: ControlSide, safety: Safety | None, age_s: float, lives: bool, enabled: bool
 ) -> None:
-    view = ControlView(control.directory)
+    view = ControlView(control.directory, INSTRUMENT)
     if safety is not None:
         control.say(safety, age_s=age_s)
     view.update(time.monotonic_ns())
