@@ -24,7 +24,9 @@ router = APIRouter(tags=["paths"])
 
 
 def list_experiments(configuration: Configuration) -> list[ExperimentEntry]:
-    """Every experiment, with its length."""
+    """Every experiment of the robot that is driven, with its length."""
+    if configuration.robot == "concentric":
+        return _list_tube_paths()
     from scenes import experiments
 
     found = [experiments.experiment(name, configuration) for name in experiments.names()]
@@ -42,6 +44,23 @@ def list_experiments(configuration: Configuration) -> list[ExperimentEntry]:
     ]
 
 
+def _list_tube_paths() -> list[ExperimentEntry]:
+    from scenes.experiments.tube_playing import TITLES, played
+
+    return [
+        ExperimentEntry(
+            name=name,
+            title=title,
+            duration_s=round(played(name).duration_s, 1),
+            board=None,
+            arm_locked=False,
+            cases=[],
+            marks_s=[],
+        )
+        for name, title in TITLES.items()
+    ]
+
+
 def _board_of(experiment: Experiment) -> str | None:
     """Name of the board that must stand there; None where any may."""
     return experiment.board if experiment.board != "none" or experiment.needs_room else None
@@ -53,9 +72,13 @@ def _wanted(body: PathStart, configuration: Configuration) -> tuple[Path, str | 
         from scenes.path_file import parse_csv
 
         return parse_csv(body.csv, body.name), None, False
+    assert body.experiment is not None
+    if configuration.robot == "concentric":
+        from scenes.experiments.tube_playing import played
+
+        return played(body.experiment), None, False
     from scenes import experiments
 
-    assert body.experiment is not None
     found = experiments.experiment(body.experiment, configuration)
     return found.path, _board_of(found), found.lock_arm
 
