@@ -1,6 +1,5 @@
 // Requests to the server. Every refusal becomes one error that carries the problem document.
 
-export const ROBOT = "/api/v1/robots/instrument";
 const TIMEOUT_MS = 4000;
 
 /** A refusal: `message` is the problem's detail, `status` 0 when the server was not reached. */

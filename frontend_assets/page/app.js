@@ -1,46 +1,48 @@
 // The operator page: the stream brings states, every part shows its own share of the newest one.
 
-import { call, ROBOT } from "/assets/api.js";
-import { Boards } from "/assets/boards.js";
+import { concentricPage } from "/assets/concentric_page.js";
 import { Devices } from "/assets/devices.js";
 import { byId, setData, setText } from "/assets/dom.js";
 import { Drawer } from "/assets/drawer.js";
 import { Events } from "/assets/events.js";
 import { HandOver } from "/assets/hand_over.js";
 import { GamepadLeader } from "/assets/gamepad.js";
+import { instrumentPage } from "/assets/instrument_page.js";
 import { startKeys } from "/assets/keys.js";
 import { Motion } from "/assets/motion.js";
 import { refuse, showBanner, showLink, tell } from "/assets/notices.js";
 import { Numbers } from "/assets/numbers.js";
 import { showOperator, startOperator, whyNotDriving } from "/assets/operator.js";
 import { Paths } from "/assets/paths.js";
+import { RobotChoice } from "/assets/robot_choice.js";
+import { DRIVEN } from "/assets/robots.js";
 import { startScene } from "/assets/scene.js";
 import { Recording } from "/assets/recording.js";
 import { Replay } from "/assets/replay.js";
 import { Settings } from "/assets/settings.js";
 import { StateStream } from "/assets/stream.js";
 import { startStylus } from "/assets/stylus.js";
-import { showTask } from "/assets/task.js";
 import { switchTheme } from "/assets/theme.js";
 import { startTooltips } from "/assets/tooltips.js";
 import { showFacts, showSafety } from "/assets/topbar.js";
 import { Traces } from "/assets/traces.js";
-import { Trocar } from "/assets/trocar.js";
 
 const SHOW_MS = 100;
 const LATE_S = 1;
 const LEADERS = { none: "none", gizmo: "gizmo", api_pose: "API, relative pose", api_target: "API, target pose", path: "path", stylus: "stylus", gamepad: "gamepad" };
 
+const PAGES = { instrument: instrumentPage, concentric: concentricPage };
+
 window.keyhole = { state: null };
 
 const stream = new StateStream({ onState: take, onLink, onProblem, onNotice });
 const motion = new Motion(stream, take);
-const settings = new Settings();
-const boards = new Boards();
-const paths = new Paths(boards);
-const trocar = new Trocar();
-const traces = new Traces();
-const numbers = new Numbers();
+const own = PAGES[DRIVEN.name]();
+const settings = new Settings(own.choices);
+const paths = new Paths(own.why);
+const traces = new Traces(own.plots);
+const numbers = new Numbers(own.tips, own.numbers);
+const robots = new RobotChoice();
 const recording = new Recording();
 const replay = new Replay();
 const devices = new Devices(take);
@@ -50,7 +52,6 @@ const drawer = new Drawer({ devices: () => devices.opened(), events: () => event
 const failed = new Set();
 let shown = 0;
 let urgent = "";
-let configured = false;
 
 /** What must be on the page at once; the rest follows within 100 ms. */
 const urgencyOf = ({ safety, operator, engaged, path, control, readiness }) =>
@@ -58,6 +59,10 @@ const urgencyOf = ({ safety, operator, engaged, path, control, readiness }) =>
     operator.offered_to, operator.asked_by].join();
 
 function take(state) {
+  if (state.robot !== DRIVEN.name) {
+    location.reload();
+    return;
+  }
   if (isLate(state, window.keyhole.state)) return;
   window.keyhole.state = state;
   stream.driving = state.operator.you;
@@ -87,10 +92,9 @@ function show() {
     replay: () => replay.show(state, stream.up),
     settings: () => settings.show(state, blocked),
     paths: () => paths.show(state, blocked),
-    boards: () => boards.show(state, blocked, paths.needed),
-    trocar: () => trocar.show(state, blocked),
     devices: () => devices.show(state, blocked),
-    task: () => showTask(state),
+    robots: () => robots.show(state, stream.up),
+    ...own.parts(state, blocked, paths),
     numbers: () => numbers.show(state),
     leader: () => showLeader(state),
   };
@@ -129,8 +133,7 @@ function onLink(change) {
   showLink(change, window.keyhole.state?.operator.you === true);
   if (change.up) {
     paths.load();
-    boards.load();
-    configure();
+    own.load();
   }
   show();
 }
@@ -142,17 +145,6 @@ function onProblem({ code, detail }) {
 
 function onNotice({ kind, text }) {
   tell(text, kind === "info" ? "info" : "error");
-}
-
-async function configure() {
-  if (configured) return;
-  try {
-    const configuration = await call("GET", `${ROBOT}/configuration`);
-    numbers.servoRange_deg = configuration.module?.servo_range_deg ?? null;
-    configured = true;
-  } catch {
-    // Without it only the servo bars are missing; asked for again with the next connection.
-  }
 }
 
 // Not modal: the emergency stop beside it must stay within reach of the mouse.

@@ -1,8 +1,9 @@
 // The board before the instrument: which stands there, and putting another in its place.
 
-import { call, ROBOT } from "/assets/api.js";
+import { call } from "/assets/api.js";
 import { byId, make, onPress, setBlocked, setData, setHidden, setText, setUnusable } from "/assets/dom.js";
 import { attempt, refuse, tell } from "/assets/notices.js";
+import { ROBOT } from "/assets/robots.js";
 
 const CHANGE_MS = 8000;
 

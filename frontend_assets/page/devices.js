@@ -1,9 +1,10 @@
 // Servo bus and arm: how they are, and what can be asked of them.
 
-import { call, ROBOT } from "/assets/api.js";
+import { call } from "/assets/api.js";
 import { byId, make, onPress, setBlocked, setData, setHidden, setText, setUnusable } from "/assets/dom.js";
 import { fixed, sentence } from "/assets/format.js";
 import { attempt, refuse, tell } from "/assets/notices.js";
+import { ROBOT } from "/assets/robots.js";
 
 const STATES = {
   simulated: "Simulated",

@@ -1,8 +1,9 @@
 // The audit log's newest entries: what happened, by whom, and what was refused.
 
-import { call, ROBOT } from "/assets/api.js";
+import { call } from "/assets/api.js";
 import { byId, make } from "/assets/dom.js";
 import { attempt } from "/assets/notices.js";
+import { ROBOT } from "/assets/robots.js";
 
 const ASK_MS = 1500;
 const SHOWN = 80;

@@ -1,9 +1,10 @@
 // Control goes from one person to another in sight of both: asked for, offered, taken, or declined.
 
-import { call, ROBOT } from "/assets/api.js";
+import { call } from "/assets/api.js";
 import { byId, setHidden, setText } from "/assets/dom.js";
 import { attempt } from "/assets/notices.js";
 import { myName } from "/assets/operator.js";
+import { ROBOT } from "/assets/robots.js";
 
 export class HandOver {
   constructor() {

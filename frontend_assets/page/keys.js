@@ -1,10 +1,14 @@
 // The keyboard. W, A, S, D, Q, E and the arrows belong to the scene's camera, so no shortcut is there.
 
 import { byId, make } from "/assets/dom.js";
+import { DRIVEN } from "/assets/robots.js";
 import { sceneWindow } from "/assets/scene.js";
 
-/** `press`: the control that the key presses. Every shortcut is listed in the help. */
-const KEYS = [
+/**
+ * `press`: the control that the key presses; `robot`: the only one that has it. Every shortcut is
+ * listed in the help.
+ */
+const ALL_KEYS = [
   { key: "Escape", show: "Esc", words: "Emergency stop, also while typing" },
   { key: " ", show: "Space", words: "Move while held (hold-to-move)" },
   { key: "c", show: "C", words: "Take or release control", press: ["take-control", "release-control"] },
@@ -13,26 +17,33 @@ const KEYS = [
   { key: "x", show: "X", words: "Disable", press: ["disable"] },
   { key: "r", show: "R", words: "Reset a fault", press: ["reset"] },
   { key: "h", show: "H", words: "Hold-to-move on or off", press: ["hold-to-move"] },
-  { key: "1", show: "1 2 3 4", words: "Balanced, linear first, angular first, pointing", pick: ["case", "0"] },
-  { key: "2", pick: ["case", "1"] },
-  { key: "3", pick: ["case", "2"] },
-  { key: "4", pick: ["case", "pointing"] },
+  { key: "1", robot: "instrument", show: "1 2 3 4", words: "Balanced, linear first, angular first, pointing", pick: ["case", "0"] },
+  { key: "2", robot: "instrument", pick: ["case", "1"] },
+  { key: "3", robot: "instrument", pick: ["case", "2"] },
+  { key: "4", robot: "instrument", pick: ["case", "pointing"] },
+  { key: "1", robot: "concentric", show: "1 2 3 4 5", words: "Concentric tubes: NSPWLN, NSPWLN repaired, NSPQP, SNSQP, HQP", pick: ["method", "nspwln"] },
+  { key: "2", robot: "concentric", pick: ["method", "nspwln-repaired"] },
+  { key: "3", robot: "concentric", pick: ["method", "nspqp"] },
+  { key: "4", robot: "concentric", pick: ["method", "snsqp"] },
+  { key: "5", robot: "concentric", pick: ["method", "hqp"] },
   { key: "[", show: "[ ]", words: "Motion scale down, up" },
   { key: "]" },
-  { key: "o", show: "O", words: "Lock rotation", press: ["lock-rotation"] },
+  { key: "o", robot: "instrument", show: "O", words: "Lock rotation", press: ["lock-rotation"] },
   { key: "t", show: "T", words: "Lock translation", press: ["lock-translation"] },
-  { key: "m", show: "M", words: "Alignment relative or matched", other: "alignment" },
+  { key: "m", robot: "instrument", show: "M", words: "Alignment relative or matched", other: "alignment" },
   { key: "v", show: "V", words: "Align with view", press: ["align-view"] },
   { key: "k", show: "K", words: "Play or stop the path; play or pause a replay", press: ["replay-play", "stop-path", "play"] },
   { key: "l", show: "L", words: "Start or stop recording", press: ["record"] },
-  { key: "b", show: "B", words: "Straighten and withdraw", press: ["withdraw"] },
+  { key: "b", robot: "instrument", show: "B", words: "Straighten and withdraw", press: ["withdraw"] },
   { key: "i", show: "I", words: "Devices: open or close", press: ["show-devices"] },
   { key: "j", show: "J", words: "Events: open or close", press: ["show-events"] },
+  { key: "u", show: "U", words: "Choose the robot", open: "robot" },
   { key: "f", show: "F", words: "Freeze the plots", press: ["freeze"] },
   { key: "z", show: "Z", words: "Time window of the plots", other: "window" },
   { key: "n", show: "N", words: "Light or dark", press: ["theme"] },
   { key: "?", show: "?", words: "This help", press: ["help"] },
 ];
+const KEYS = ALL_KEYS.filter(({ robot }) => !robot || robot === DRIVEN.name);
 
 /**
  * Listen on the page and in the scene.
@@ -92,12 +103,14 @@ function up(event, acts) {
   acts.hold(false);
 }
 
-function run({ press, pick, other }, acts) {
+function run({ press, pick, other, open }, acts) {
   let control;
-  if (press) control = press.map(byId).find((element) => isUsable(element)) ?? byId(press.at(-1));
+  if (open) control = byId(open);
+  else if (press) control = press.map(byId).find((element) => isUsable(element)) ?? byId(press.at(-1));
   else if (pick) control = document.querySelector(`input[name="${pick[0]}"][value="${pick[1]}"]`);
   else control = nextOf(other);
   if (control.disabled) acts.refuse(control.closest("[data-tip]").dataset.why);
+  else if (open) control.focus();
   else control.click();
 }
 

@@ -1,10 +1,11 @@
 // Safety requests and hold-to-move.
 
-import { call, ROBOT } from "/assets/api.js";
+import { call } from "/assets/api.js";
 import { byId, onPress, setBlocked, setData, setText } from "/assets/dom.js";
 import { sentence } from "/assets/format.js";
 import { attempt, refuse } from "/assets/notices.js";
 import { REPLAY_WORDS } from "/assets/replay.js";
+import { ROBOT } from "/assets/robots.js";
 
 const REQUESTS = ["enable", "pause", "disable", "reset"];
 

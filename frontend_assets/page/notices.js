@@ -56,7 +56,7 @@ function bannerOf({ safety, control }) {
   return ["", "", "fault"];
 }
 
-const link = { up: true, reason: "", retryAt: 0, driving: false };
+const link = { up: true, reason: "", retryAt: 0, driving: false, starting: "" };
 setInterval(countDown, 250);
 
 /** Cover the scene while there is no connection. */
@@ -65,6 +65,21 @@ export function showLink(change, driving) {
   if (driving) link.driving = true;
   if (link.up) link.driving = false;
   document.body.dataset.link = link.up ? "up" : "lost";
+  if (!link.starting) showLost();
+}
+
+/** Cover the scene while the console starts anew with the robot of that title; "" uncovers it. */
+export function showStarting(title) {
+  link.starting = title;
+  setHidden(byId("retry"), title !== "");
+  if (!title) return showLost();
+  setHidden(byId("lost"), false);
+  setText(byId("lost-title"), `Starting: ${title}`);
+  setText(byId("lost-text"), "The console starts anew with this robot. It will be disabled, and nobody will drive it.");
+  setText(byId("lost-next"), "Starting… this takes up to a minute");
+}
+
+function showLost() {
   setHidden(byId("lost"), link.up);
   setText(byId("lost-title"), link.reason ? "Not let in" : "Connection lost");
   const pause = link.driving ? "You were driving: the server pauses the robot by itself. " : "";
@@ -74,7 +89,7 @@ export function showLink(change, driving) {
 }
 
 function countDown() {
-  if (link.up || link.retryAt === null) return;
+  if (link.up || link.starting || link.retryAt === null) return;
   const seconds = Math.max(0, Math.ceil((link.retryAt - Date.now()) / 1000));
   setText(byId("lost-next"), seconds > 0 ? `Trying again in ${seconds} s` : "Trying now…");
 }

@@ -1,9 +1,10 @@
 // Who drives: take, release and hand over control. One person drives, the others watch.
 
-import { actUnder, call, ROBOT } from "/assets/api.js";
+import { actUnder, call } from "/assets/api.js";
 import { byId, onPress, setBlocked, setData, setHidden, setText } from "/assets/dom.js";
 import { attempt, refuse, tell } from "/assets/notices.js";
 import { REPLAY_WORDS } from "/assets/replay.js";
+import { ROBOT } from "/assets/robots.js";
 
 const KEY = "keyhole-operator";
 

@@ -1,16 +1,17 @@
 // Paths: play an experiment or a CSV file, see its progress, stop it.
 
-import { call, ROBOT } from "/assets/api.js";
+import { call } from "/assets/api.js";
 import { byId, make, onPress, setBlocked, setData, setText } from "/assets/dom.js";
 import { percent } from "/assets/format.js";
 import { attempt, refuse, tell } from "/assets/notices.js";
+import { ROBOT } from "/assets/robots.js";
 
 const LARGEST_BYTES = 20e6;
 
 export class Paths {
-  /** `boards`: knows which board stands there. */
-  constructor(boards) {
-    this.boards = boards;
+  /** `why(board, state)`: why an experiment made for that board cannot be played now, or "". */
+  constructor(why) {
+    this.why = why;
     this.titles = new Map();
     this.boardOf = new Map();
     this.chosen = false;
@@ -81,22 +82,23 @@ export class Paths {
     });
   }
 
-  /** At first, an experiment that fits the board that stands there. */
-  #choose(board) {
+  /** At first, an experiment that can be played as things stand. */
+  #choose(state) {
     if (this.chosen || this.titles.size === 0) return;
     this.chosen = true;
-    const fitting = [...this.boardOf.keys()].find((name) => this.boards.why(this.boardOf.get(name), board) === "");
+    const fitting = [...this.boardOf.keys()].find((name) => this.why(this.boardOf.get(name), state) === "");
     if (fitting !== undefined) byId("experiment").value = fitting;
     this.#describe();
   }
 
-  show({ path, safety, board, control }, blocked) {
-    if (control === "running") this.#choose(board);
+  show(state, blocked) {
+    const { path, safety, control } = state;
+    if (control === "running") this.#choose(state);
     const asleep = safety.state === "ENABLED" ? "" : "Enable the robot first.";
     const running = path ? "A path is playing. Stop it first." : "";
     this.blocked = blocked || asleep || running;
     const listed = this.titles.size ? "" : "No experiments were listed.";
-    setBlocked(byId("play"), this.boards.why(this.needed, board) || this.blocked || listed);
+    setBlocked(byId("play"), this.why(this.needed, state) || this.blocked || listed);
     setBlocked(byId("stop-path"), blocked || (path ? "" : "No path is playing."));
     byId("path-progress").value = path?.progress ?? 0;
     const name = this.titles.get(path?.name) ?? path?.name ?? "Path";

@@ -1,4 +1,4 @@
-// A small plot on a canvas: one line over time, a y axis with round figures, dashed limit lines.
+// A small plot on a canvas: lines over time, a y axis with round figures, dashed limit lines.
 
 import { decimate } from "/assets/history.js";
 
@@ -52,7 +52,9 @@ const timeStep = (window_s) => (window_s <= 10 ? 2 : window_s <= 20 ? 5 : 10);
 
 export class Plot {
   /**
-   * `spec`: key, word (colour), floor (least top of the y axis) or span ([low, high] always shown).
+   * `spec`: lines, and floor (least top of the y axis) or span(low, high, marks) ([low, high]).
+   * A line: key, word (colour), and where wanted a name at its end, dashed, and bounded: whether
+   * `${key} lower` and `${key} upper` of the history are the bounds that it moves between.
    */
   constructor(canvas, spec) {
     this.canvas = canvas;
@@ -60,60 +62,107 @@ export class Plot {
   }
 
   /**
-   * Draw [end_s - window_s, end_s] of the history; `lines`: [{value, label, kind}] with kind
-   * "limit" or "reference"; `cursor_s`: time under the pointer, or null.
+   * Draw [end_s - window_s, end_s] of the history; `lines`: those of the spec that there are; `marks`:
+   * [{value, label, kind}] with kind "limit" or "reference"; `cursor_s`: time under the pointer, or null.
    */
-  draw({ history, end_s, window_s, cursor_s }, lines) {
+  draw({ history, end_s, window_s, cursor_s }, lines, marks) {
     const { context, width, height } = surface(this.canvas);
     if (width === 0) return;
-    const column = history.columns[this.spec.key];
     const from = history.place(end_s - window_s);
     const to = history.place(end_s + 1e-9);
-    const [low, high] = this.#range(column, from, to, lines);
+    const [low, high] = this.#range(lines.map(({ key }) => history.columns[key]), from, to, marks);
     const area = { left: LEFT_PX, right: width - 1, top: 5, bottom: height - 5 };
     const x = (time) => area.right - ((end_s - time) / window_s) * (area.right - area.left);
     const y = (value) => area.bottom - ((value - low) / (high - low)) * (area.bottom - area.top);
     drawGrid(context, area, { window_s, low, high, y });
-    for (const line of lines) drawLine(context, area, line, y(line.value));
-    this.#drawTrace(context, column, history.time, decimate(column, Math.max(history.start, from - 1), to, MOST_POINTS), area, x, y);
-    for (const line of lines) labelLine(context, area, line, y(line.value));
+    for (const mark of marks) if (mark.value <= high) drawMark(context, area, mark, y(mark.value));
+    const first = Math.max(history.start, from - 1);
+    const traces = lines.map((line) => ({ line, places: decimate(history.columns[line.key], first, to, MOST_POINTS) }));
+    inside(context, area, () => {
+      for (const { line, places } of traces) if (line.bounded) drawBounds(context, history, line, places, x, y);
+      for (const { line, places } of traces) drawTrace(context, history, line, places, x, y);
+    });
+    traces.forEach(({ line }, index) => nameTrace(context, area, line, y(history.columns[line.key][to - 1]), index));
+    for (const mark of marks) labelMark(context, area, mark, mark.value <= high ? y(mark.value) : null);
     if (cursor_s !== null) drawCursor(context, area, x(cursor_s));
   }
 
-  #range(column, from, to, lines) {
+  #range(columns, from, to, marks) {
     let high = -Infinity;
     let low = Infinity;
-    for (let place = from; place < to; place += 1) {
-      if (column[place] > high) high = column[place];
-      if (column[place] < low) low = column[place];
+    for (const column of columns) {
+      for (let place = from; place < to; place += 1) {
+        if (column[place] > high) high = column[place];
+        if (column[place] < low) low = column[place];
+      }
     }
-    if (this.spec.span) {
-      const [least, most] = this.spec.span(lines);
-      return [Math.min(least, Number.isFinite(low) ? low : least), Math.max(most, high)];
-    }
-    return [0, roundUp(Math.max(this.spec.floor, high * 1.05))];
+    const [floor, top] = high < low ? [0, 0] : [low, high];
+    if (!this.spec.span) return [0, roundUp(Math.max(this.spec.floor, top * 1.05))];
+    const [least, most] = this.spec.span(floor, top, marks);
+    return [Math.min(least, floor), most];
   }
+}
 
-  #drawTrace(context, column, time, places, area, x, y) {
-    context.save();
-    context.beginPath();
-    context.rect(area.left, area.top - 2, area.right - area.left + 1, area.bottom - area.top + 4);
-    context.clip();
-    context.beginPath();
-    let broken = true;
-    for (const place of places) {
-      if (Number.isNaN(column[place])) broken = true;
-      else if (broken) {
-        context.moveTo(x(time[place]), y(column[place]));
-        broken = false;
-      } else context.lineTo(x(time[place]), y(column[place]));
-    }
-    context.strokeStyle = colour(this.spec.word);
-    context.lineWidth = 1.6;
-    context.lineJoin = "round";
-    context.stroke();
-    context.restore();
+/** Draw within the area only. */
+function inside(context, area, draw) {
+  context.save();
+  context.beginPath();
+  context.rect(area.left, area.top - 2, area.right - area.left + 1, area.bottom - area.top + 4);
+  context.clip();
+  draw();
+  context.restore();
+}
+
+/** Add a column to the present path; what is no number breaks the line. */
+function follow(context, column, time, places, x, y) {
+  let broken = true;
+  for (const place of places) {
+    if (Number.isNaN(column[place])) broken = true;
+    else if (broken) {
+      context.moveTo(x(time[place]), y(column[place]));
+      broken = false;
+    } else context.lineTo(x(time[place]), y(column[place]));
   }
+}
+
+function drawTrace(context, { columns, time }, { key, word, dashed }, places, x, y) {
+  context.beginPath();
+  follow(context, columns[key], time, places, x, y);
+  context.strokeStyle = colour(word);
+  context.lineWidth = 1.6;
+  context.lineJoin = "round";
+  context.setLineDash(dashed ? [5, 3] : []);
+  context.stroke();
+}
+
+function drawBounds(context, { columns, time }, { key, word }, places, x, y) {
+  context.strokeStyle = colour(word);
+  context.lineWidth = 1;
+  context.setLineDash([1.5, 2.5]);
+  for (const side of ["lower", "upper"]) {
+    context.beginPath();
+    follow(context, columns[`${key} ${side}`], time, places, x, y);
+    context.stroke();
+  }
+}
+
+/** The name of a line at its end; lines that meet have their names side by side. */
+function nameTrace(context, area, { name, word }, y, index) {
+  if (!name || !Number.isFinite(y)) return;
+  const place = [area.right - 3 - 12 * index, Math.min(area.bottom - 1, Math.max(area.top + 9, y - 2))];
+  context.textAlign = "right";
+  context.textBaseline = "bottom";
+  halo(context, name, place, colour(word));
+}
+
+/** Text on a halo of the background. */
+function halo(context, text, place, ink) {
+  context.lineWidth = 3;
+  context.lineJoin = "round";
+  context.strokeStyle = colour("panel");
+  context.strokeText(text, ...place);
+  context.fillStyle = ink;
+  context.fillText(text, ...place);
 }
 
 function drawGrid(context, area, { window_s, low, high, y }) {
@@ -147,7 +196,7 @@ function tickText(value, span) {
   return value.toFixed(places).replace("-", "\u2212");
 }
 
-function drawLine(context, area, { kind }, y) {
+function drawMark(context, area, { kind }, y) {
   const place = Math.round(y) + 0.5;
   context.save();
   context.strokeStyle = colour(kind === "limit" ? "limit" : "muted");
@@ -160,19 +209,14 @@ function drawLine(context, area, { kind }, y) {
   context.restore();
 }
 
-/** The label stands on its line, inside the area, on a halo of the background. */
-function labelLine(context, area, { kind, label }, y) {
-  const above = y - 12 > area.top - 4;
+/** The label stands on its line, inside the area; one above the area has an arrow instead. */
+function labelMark(context, area, { kind, label }, y) {
+  const above = y !== null && y - 12 > area.top - 4;
   context.textAlign = "left";
   context.textBaseline = above ? "bottom" : "top";
-  context.lineWidth = 3;
-  context.lineJoin = "round";
-  context.strokeStyle = colour("panel");
   // A reference stands further in, where it cannot meet the label of a limit close by.
-  const place = [area.left + (kind === "limit" ? 4 : 76), above ? y - 1 : y + 2];
-  context.strokeText(label, ...place);
-  context.fillStyle = colour(kind === "limit" ? "limit" : "muted");
-  context.fillText(label, ...place);
+  const place = [area.left + (kind === "limit" ? 4 : 76), y === null ? area.top - 2 : above ? y - 1 : y + 2];
+  halo(context, y === null ? `\u2191 ${label}` : label, place, colour(kind === "limit" ? "limit" : "muted"));
 }
 
 function drawCursor(context, area, x) {

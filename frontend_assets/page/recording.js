@@ -1,9 +1,10 @@
 // The button that starts and stops a recording, and what is known of the present one.
 
-import { call, ROBOT } from "/assets/api.js";
+import { call } from "/assets/api.js";
 import { byId, onPress, setBlocked, setData, setText } from "/assets/dom.js";
 import { clock } from "/assets/format.js";
 import { attempt, refuse, tell } from "/assets/notices.js";
+import { ROBOT } from "/assets/robots.js";
 
 const ASK_MS = 1000;
 

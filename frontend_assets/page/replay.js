@@ -1,9 +1,10 @@
 // A recording shown in place of a robot: play, pause, time and speed. Everyone sees the same.
 
-import { call, ROBOT } from "/assets/api.js";
+import { call } from "/assets/api.js";
 import { byId, onPress, setBlocked, setData, setHidden, setText } from "/assets/dom.js";
 import { clock } from "/assets/format.js";
 import { attempt, refuse } from "/assets/notices.js";
+import { ROBOT } from "/assets/robots.js";
 
 const STEP_S = 0.01;
 const SETTLE_MS = 400;

@@ -1,10 +1,10 @@
-// The operator's choices: priority, teleoperation. The server's state decides what is shown;
-// while a change is on its way, the control keeps what the person chose.
+// The operator's choices. The server's state decides what is shown; while a change is on its way, the
+// control keeps what the person chose.
 
-import { call, ROBOT } from "/assets/api.js";
+import { call } from "/assets/api.js";
 import { byId, onPress, setBlocked, setText, setUnusable } from "/assets/dom.js";
-import { figure, fixed } from "/assets/format.js";
 import { refuse, tell } from "/assets/notices.js";
+import { ROBOT } from "/assets/robots.js";
 import { viewOrientation } from "/assets/scene.js";
 
 const SETTLE_MS = 400;
@@ -12,42 +12,43 @@ const SLIDER_MS = 100;
 const SLIDER_STEPS = 1000;
 const KEY_FACTOR = 1.25;
 
-const SWITCHES = { "hold-to-move": "hold_to_move", "lock-rotation": "lock_rotation", "lock-translation": "lock_translation" };
+/**
+ * What every robot lets its operator choose. `control`: "switch" or "list" with that `id`, or "radio"
+ * with that name; `where`, `key`: where it is put; `read(state)`: what is in force; `beside()`: what
+ * has to be put with it.
+ */
+const SHARED = [
+  { control: "switch", id: "hold-to-move", where: "teleoperation", key: "hold_to_move", read: (state) => state.teleoperation.hold_to_move },
+  { control: "switch", id: "lock-translation", where: "teleoperation", key: "lock_translation", read: (state) => state.teleoperation.lock_translation },
+];
 
 export class Settings {
-  constructor() {
+  /** `own`: choices that only this robot has, in the form of those above. */
+  constructor(own) {
+    this.choices = [...SHARED, ...own];
     this.busy = new Map();
     this.range = { min: 0.05, max: 2 };
     this.lastSlide = 0;
     this.slideTimer = null;
-    for (const [id, key] of Object.entries(SWITCHES)) {
-      byId(id).addEventListener("change", () => this.#put("teleoperation", key, byId(id).checked));
-    }
-    this.#onPick("alignment", "teleoperation");
-    this.#onPick("case", "priority");
-    for (const key of ["solver", "coordinates"]) {
-      byId(key).addEventListener("change", () => this.#put("priority", key, byId(key).value));
-    }
-    byId("compensation").addEventListener("change", () => this.#put("compensation", "mode", byId("compensation").value));
-    byId("tracker").addEventListener("change", () => this.#put("compensation", "tracker", byId("tracker").checked));
+    for (const choice of this.choices) this.#listen(choice);
     byId("motion-scale").addEventListener("input", () => this.#slide());
     byId("motion-scale").addEventListener("dblclick", () => this.#setScale(1));
     onPress(byId("align-view"), () => this.#alignView(), refuse);
   }
 
-  #onPick(name, where) {
-    for (const input of document.querySelectorAll(`input[name="${name}"]`)) {
-      input.addEventListener("change", () => this.#put(where, name, input.value));
+  #listen({ control, id, where, key, beside }) {
+    for (const input of inputsOf(control, id)) {
+      input.addEventListener("change", () => {
+        const value = control === "switch" ? input.checked : input.value;
+        this.#put(where, key, value, beside?.() ?? {});
+      });
     }
   }
 
-  /** Priority is sent with its case always; the rest only when changed. */
-  async #put(where, key, value) {
-    const body = { [key]: value };
-    if (where === "priority" && key !== "case") body.case = picked("case");
+  async #put(where, key, value, beside = {}) {
     this.busy.set(key, Infinity);
     try {
-      await call("PUT", `${ROBOT}/${where}`, body);
+      await call("PUT", `${ROBOT}/${where}`, { ...beside, [key]: value });
       this.busy.set(key, performance.now() + SETTLE_MS);
       return true;
     } catch (refusal) {
@@ -116,37 +117,30 @@ export class Settings {
     this.#showScale(motion_scale);
   }
 
-  #showInstrument({ compensation, tracker }) {
-    const list = byId("compensation");
-    if (this.#isFree("mode") && document.activeElement !== list) list.value = compensation;
-    if (this.#isFree("tracker")) byId("tracker").checked = tracker.on;
-    const seen = tracker.age_ms === null ? "No sample of a tracker" : `Newest sample ${fixed(tracker.age_ms, 0)} ms old`;
-    const correction = `corrects by ${figure(tracker.correction_mm)} mm, ${figure(tracker.correction_deg)} deg`;
-    setText(byId("tracker-words"), tracker.on ? `${seen}; ${correction}` : seen);
-  }
-
-  show({ priority, teleoperation, compensation, tracker }, blocked) {
-    for (const [id, key] of Object.entries(SWITCHES)) {
-      if (this.#isFree(key)) byId(id).checked = teleoperation[key];
+  show(state, blocked) {
+    for (const { control, id, key, read } of this.choices) {
+      if (this.#isFree(key)) pick(control, id, read(state));
     }
-    if (this.#isFree("alignment")) pick("alignment", teleoperation.alignment);
-    if (this.#isFree("case")) pick("case", priority.case);
-    for (const key of ["solver", "coordinates"]) {
-      if (this.#isFree(key) && document.activeElement !== byId(key)) byId(key).value = priority[key];
-    }
-    this.#showRange(teleoperation);
-    this.#showInstrument({ compensation, tracker });
+    this.#showRange(state.teleoperation);
     for (const input of document.querySelectorAll("input.drive, select.drive")) setUnusable(input, blocked);
-    if (!blocked && priority.solver === "hqp") setUnusable(byId("coordinates"), "The QP always uses u, v.");
     setBlocked(byId("align-view"), blocked);
   }
 }
 
-const picked = (name) => document.querySelector(`input[name="${name}"]:checked`)?.value;
+const inputsOf = (control, id) =>
+  control === "radio" ? [...document.querySelectorAll(`input[name="${id}"]`)] : [byId(id)];
 
-function pick(name, value) {
-  for (const input of document.querySelectorAll(`input[name="${name}"]`)) {
-    const wanted = input.value === value;
-    if (input.checked !== wanted) input.checked = wanted;
+/** What is chosen among the radio buttons of that name. */
+export const picked = (name) => document.querySelector(`input[name="${name}"]:checked`)?.value;
+
+function pick(control, id, value) {
+  for (const input of inputsOf(control, id)) {
+    if (control === "list") {
+      // A list that is open in front of a person is not changed under their hands.
+      if (document.activeElement !== input && input.value !== value) input.value = value;
+    } else {
+      const wanted = control === "switch" ? value : input.value === value;
+      if (input.checked !== wanted) input.checked = wanted;
+    }
   }
 }

@@ -1,7 +1,8 @@
 // The one WebSocket: state comes in; heartbeats, hold and renewals go out.
 // It reconnects by itself, waiting 0.25 s at first and twice as long each time, up to 4 s.
 
-import { call, ROBOT } from "/assets/api.js";
+import { call } from "/assets/api.js";
+import { ROBOT } from "/assets/robots.js";
 
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 4000;
@@ -91,6 +92,8 @@ export class StateStream {
     try {
       await call("GET", `${ROBOT}/state`);
     } catch (refusal) {
+      // Someone has chosen another robot: this page is not its page.
+      if (refusal.code === "robot_not_selected") return location.reload();
       const current = socket === this.socket && !this.up;
       const refused = refusal.status === 401 || refusal.status === 403;
       if (current && refused) this.onLink({ up: false, reason: refusal.message, retryAt: null });

@@ -1,7 +1,8 @@
 // One line about the stylus, where there is one: its rate, or what is amiss.
 
-import { call, ROBOT } from "/assets/api.js";
+import { call } from "/assets/api.js";
 import { byId, setData, setText } from "/assets/dom.js";
+import { ROBOT } from "/assets/robots.js";
 
 const ASK_MS = 1000;
 

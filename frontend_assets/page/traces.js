@@ -1,40 +1,31 @@
-// The five plots of the monitor, their readings, the time window, freeze and the shared cursor.
+// The plots of the monitor, their readings, the time window, freeze and the shared cursor.
 
-import { byId, make, setText } from "/assets/dom.js";
-import { figure, fine, fixed } from "/assets/format.js";
+import { byId, make, setData, setHidden, setText } from "/assets/dom.js";
+import { fixed } from "/assets/format.js";
 import { History } from "/assets/history.js";
 import { Plot, drawTimeAxis, forgetColours, timeAt } from "/assets/plots.js";
 import { onTheme } from "/assets/theme.js";
-
-const LAMBDA = "λ at the trocar";
-
-/** `floor`: least top of the y axis, so that numerical noise does not fill the plot. */
-const TRACES = [
-  { key: "position", title: "Position error", unit: "mm", floor: 0.01, text: figure },
-  { key: "orientation", title: "Orientation error", unit: "deg", floor: 0.01, text: figure },
-  { key: "rcm", title: "RCM error", unit: "mm", floor: 0.01, text: fine },
-  { key: "lambda", title: LAMBDA, unit: "0–1", word: "commanded", span: () => [0, 1], text: (value) => fixed(value, 3), both: true },
-  { key: "bend", title: "Bend", unit: "deg", word: "commanded", span: bendSpan, text: (value) => fixed(value, 1) },
-];
-
-/** Room above the limit, in steps of 30 degrees. */
-function bendSpan(lines) {
-  return [0, Math.ceil((lines[0].value * 1.1) / 30) * 30];
-}
 
 const DRAW_MS = 100;
 const NEAR_S = 0.5;
 const CURSOR_KEYS = { ArrowLeft: -0.1, ArrowRight: 0.1 };
 
 export class Traces {
-  constructor() {
-    this.live = new History(TRACES.map(({ key }) => key));
+  /**
+   * `plots`: key, title, unit, text(value), peak(low, high) where not the greatest, share (of the
+   * usual height), marks(state), and what a Plot takes. Of each line beside: read(state); bounds:
+   * [read, read]; tip. A line's word may be "source": that which errors are measured against.
+   */
+  constructor(plots) {
+    const lines = plots.flatMap((plot) => plot.lines);
+    this.reads = lines.flatMap(readsOf);
+    this.live = new History(this.reads.map(([key]) => key));
     this.frozen = null;
     this.window_s = 20;
     this.cursor_s = null;
     this.state = null;
     this.drawn = 0;
-    this.views = TRACES.map((spec) => this.#build(spec));
+    this.views = plots.map((spec) => this.#build(spec));
     this.axis = make("canvas", "plot-axis", "", { role: "img", "aria-label": "Time axis: seconds before now" });
     byId("plots").append(this.axis);
     for (const input of document.querySelectorAll('input[name="window"]')) {
@@ -52,18 +43,28 @@ export class Traces {
     const root = make("div", "plot");
     const head = make("div", "plot-head");
     const title = make("span", "plot-title");
-    const swatch = make("i", "swatch");
-    swatch.dataset.word = spec.word ?? "true";
-    title.append(swatch, `${spec.title} `, make("span", "unit", spec.unit));
-    const now = make("span", "plot-now", "–", { id: `now-${spec.key}` });
+    title.append(`${spec.title} `, make("span", "unit", spec.unit));
+    const single = spec.lines.length === 1;
     const peak = make("span", "plot-peak", "", { id: `max-${spec.key}` });
-    head.append(title, peak, now);
+    const lines = spec.lines.map((line) => {
+      const swatch = make("i", "swatch");
+      setData(swatch, "dashed", String(line.dashed === true));
+      const now = make("span", "plot-now", "–", { id: `now-${line.key}` });
+      const reading = make("span", "plot-reading");
+      if (single) title.prepend(swatch);
+      else reading.append(swatch, `${line.name} `);
+      reading.append(now);
+      if (line.tip) reading.dataset.tip = line.tip;
+      return { line: { ...line, bounded: line.bounds !== undefined }, swatch, now, reading };
+    });
+    head.append(title, ...(single ? [peak] : []), ...lines.map(({ reading }) => reading));
     const canvas = make("canvas", "", "", { role: "img", tabindex: "0", id: `plot-${spec.key}` });
+    canvas.style.setProperty("--share", spec.share ?? 1);
     canvas.setAttribute("aria-label", `${spec.title} in ${spec.unit} over time`);
     root.append(head, canvas);
     byId("plots").append(root);
     this.#startCursor(canvas);
-    return { spec, swatch, now, peak, canvas, plot: new Plot(canvas, { word: "true", ...spec }) };
+    return { spec, lines, peak, canvas, plot: new Plot(canvas, spec) };
   }
 
   #startCursor(canvas) {
@@ -102,13 +103,7 @@ export class Traces {
   /** Remember a state; draws at most ten times a second. */
   take(state) {
     this.state = state;
-    this.live.push(state.time_s, {
-      position: state.errors.position_mm,
-      orientation: state.errors.orientation_deg,
-      rcm: state.errors.rcm_mm,
-      lambda: state.lambda.value,
-      bend: state.bend_deg,
-    });
+    this.live.push(state.time_s, Object.fromEntries(this.reads.map(([key, read]) => [key, read(state)])));
     if (performance.now() - this.drawn >= DRAW_MS) this.draw();
   }
 
@@ -119,41 +114,38 @@ export class Traces {
     const back_s = this.cursor_s === null ? null : this.#end() - this.cursor_s;
     setText(byId("error-source"), back_s === null ? `desired − ${source}` : `at −${fixed(back_s, 1)} s`);
     const view = { history: this.frozen ?? this.live, end_s: this.#end(), window_s: this.window_s, cursor_s: this.cursor_s };
-    for (const { spec, swatch, now, peak, plot } of this.views) {
-      if (!spec.word) {
-        plot.spec.word = source;
-        swatch.dataset.word = source;
+    for (const { spec, lines, peak, plot } of this.views) {
+      const present = lines.filter(({ line }) => line.read(this.state) !== undefined);
+      const coloured = present.map(({ line }) => ({ ...line, word: line.word === "source" ? source : line.word }));
+      plot.draw(view, coloured, spec.marks?.(this.state) ?? []);
+      present.forEach(({ swatch }, index) => setData(swatch, "word", coloured[index].word));
+      for (const one of lines) {
+        setHidden(one.reading, !present.includes(one));
+        this.#read(spec, one, view, peak);
       }
-      plot.draw(view, this.#lines(spec.key));
-      this.#read(spec, view, now, peak);
     }
     drawTimeAxis(this.axis, this.window_s);
   }
 
-  #lines(key) {
-    const { lambda, bend_limit_deg } = this.state;
-    if (key === "bend") return [{ value: bend_limit_deg, label: `limit ${fixed(bend_limit_deg, 0)}°`, kind: "limit" }];
-    if (key !== "lambda") return [];
-    return [
-      { value: lambda.max, label: `limit ${lambda.max}`, kind: "limit" },
-      { value: lambda.min, label: `limit ${lambda.min}`, kind: "limit" },
-      { value: lambda.reference, label: `reference ${lambda.reference}`, kind: "reference" },
-    ];
-  }
-
   /** The value now, or under the cursor, and the greatest (and least) of the window. */
-  #read(spec, { history, end_s, window_s, cursor_s }, now, peak) {
-    const column = history.columns[spec.key];
-    const from = history.place(end_s - window_s);
+  #read(spec, { line, now }, { history, end_s, window_s, cursor_s }, peak) {
+    const column = history.columns[line.key];
+    setText(now, spec.text(column[placeOf(history, cursor_s)]));
+    if (spec.lines.length > 1) return;
     let high = -Infinity;
     let low = Infinity;
-    for (let place = from; place < history.end; place += 1) {
+    for (let place = history.place(end_s - window_s); place < history.end; place += 1) {
       high = Math.max(high, Number.isNaN(column[place]) ? high : column[place]);
       low = Math.min(low, Number.isNaN(column[place]) ? low : column[place]);
     }
-    setText(now, spec.text(column[placeOf(history, cursor_s)]));
-    setText(peak, spec.both ? `${fixed(low, 2)} … ${fixed(high, 2)}` : `max ${spec.text(high)}`);
+    setText(peak, spec.peak ? spec.peak(low, high) : `max ${spec.text(high)}`);
   }
+}
+
+/** What is remembered of a line: [key, read] of the line, and of its bounds. */
+function readsOf({ key, read, bounds }) {
+  const ends = bounds ? [[`${key} lower`, bounds[0]], [`${key} upper`, bounds[1]]] : [];
+  return [[key, read], ...ends];
 }
 
 /** Place of the sample under the cursor; beyond the history's ends there is none. */

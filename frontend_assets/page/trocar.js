@@ -1,9 +1,10 @@
 // The trocar: registered by touch or by numbers, its breathing, and the way out of it.
 
-import { call, ROBOT } from "/assets/api.js";
+import { call } from "/assets/api.js";
 import { byId, onPress, setBlocked, setText, setUnusable } from "/assets/dom.js";
 import { fixed } from "/assets/format.js";
 import { attempt, refuse, tell } from "/assets/notices.js";
+import { ROBOT } from "/assets/robots.js";
 
 const AXES = ["x", "y", "z"];
 const HOW = { configuration: "As configured", touch: "Touched by the tip", enter: "Entered" };

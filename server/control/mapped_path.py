@@ -49,6 +49,11 @@ class MappedPath(Path):
         self.duration_s = float(self._breaks[-1])
 
     @staticmethod
+    def rows_in(size: int) -> int:
+        """Of how many samples the path in a file of ``size`` bytes was made."""
+        return (size // _WORD_BYTES + _ORDER * _COMPONENTS) // (1 + _ORDER * _COMPONENTS)
+
+    @staticmethod
     def file_bytes(samples: NDArray[np.float64]) -> bytes:
         """Contents of the file for a path of (n, 8) ``samples``; see :class:`scenes.path.Path`."""
         path = Path(samples, "")

@@ -63,7 +63,10 @@ class ConcentricScene(RobotScene):
         self.frames = SceneFrames(
             server,
             "Axes of the endoscope's face and of both tips",
-            [Axes(f"{FRAMES}/tip {arm}", 0.012, 0.0003, arm) for arm in ARMS],
+            [
+                Axes(f"{FRAMES}/tip A", 0.012, 0.0003, "A", "center-right"),
+                Axes(f"{FRAMES}/tip B", 0.012, 0.0003, "B", "center-left"),
+            ],
             [Axes(f"{FRAMES}/face", 0.02, 0.0004, "face")],
         )
         self.frames.visible = True

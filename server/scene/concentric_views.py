@@ -8,12 +8,14 @@ from numpy.typing import NDArray
 from server.scene.camera import FIELD_OF_VIEW, View, Viewpoints
 
 OVERVIEW, TIPS, SIDE, ENDOSCOPE = "Overview", "Tips", "Side", "Endoscope"
+AHEAD = np.array([0.0, 0.0, 0.065])
+"""The gizmo's arrow at A's tip is in view too, m."""
 REAR = np.array([0.0, 0.0, -0.10])
 """What is still to be seen behind the face, m."""
-ROOM = 1.12
+ROOM = 1.06
 """How much more than the arms is in view."""
 
-_FROM = {OVERVIEW: (0.30, -1.0, 0.16), SIDE: (1.0, -0.12, 0.16), TIPS: (0.35, -1.0, 0.35)}
+_FROM = {OVERVIEW: (0.35, -1.0, 0.5), SIDE: (1.0, -0.12, 0.3), TIPS: (0.35, -1.0, 0.6)}
 _TIPS_AROUND = 0.045
 
 
@@ -33,8 +35,8 @@ def named_view(name: str, tip_a: NDArray[np.float64], tip_b: NDArray[np.float64]
     if name == TIPS:
         around = max(_TIPS_AROUND, float(np.linalg.norm(tip_b - tip_a)))
         return View(tips + around / np.sin(FIELD_OF_VIEW / 2) * across, tips)
-    low = np.minimum(np.minimum(tip_a, tip_b), REAR)
-    high = np.maximum(np.maximum(tip_a, tip_b), REAR)
+    seen = np.array([tip_a, tip_a + AHEAD, tip_b, REAR])
+    low, high = seen.min(axis=0), seen.max(axis=0)
     look_at, half = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
     return View(look_at + ROOM * half / np.sin(FIELD_OF_VIEW / 2) * across, look_at)
 

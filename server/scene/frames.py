@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import viser
@@ -15,13 +15,17 @@ ROOT = "/frames"
 LABEL_SCALE = 0.7
 
 
+LabelAnchor = Literal["bottom-center", "center-left", "center-right"]
+
+
 class Axes(NamedTuple):
-    """Axes to be drawn at a scene node: length and radius in m, and a label above, or ""."""
+    """Axes to be drawn at a scene node: length and radius in m; a label above or beside, or ""."""
 
     node: str
     length: float
     radius: float
     label: str = ""
+    anchor: LabelAnchor = "bottom-center"
 
 
 class SceneFrames:
@@ -70,7 +74,7 @@ class SceneFrames:
                     axes.label,
                     position=(0.0, 0.0, 1.1 * axes.length),
                     font_screen_scale=LABEL_SCALE,
-                    anchor="bottom-center",
+                    anchor=axes.anchor,
                 )
         self.words = words
         self.visible = False

@@ -59,7 +59,8 @@ class SceneGizmo:
             server: draws, and calls back on its event loop.
             link: takes the samples.
             timeout_s: age at which a sample is stale.
-            turns: it has rings that turn it.
+            turns: it has rings that turn it, and squares that move it in a plane; otherwise only
+                the arrows, which hide less of what is near the tip.
         """
         self._link = link
         self._timeout = timeout_s
@@ -76,6 +77,7 @@ class SceneGizmo:
             scale=SIZE,
             line_width=3.0,
             disable_rotations=not turns,
+            disable_sliders=not turns,
             depth_test=False,
             opacity=RESTING_OPACITY,
         )

@@ -26,6 +26,7 @@ from server.scene.concentric_scene import ConcentricScene
 from server.scene.gizmo import GizmoLink, SceneGizmo
 from server.scene.instrument_scene import InstrumentScene
 from server.scene.panel import ScenePanel
+from server.scene.path_line import ScenePath
 from server.scene.robot_scene import RobotScene
 from server.scene.trails import SceneTrails
 
@@ -40,6 +41,9 @@ log = logging.getLogger(__name__)
 
 class SceneLink(GizmoLink, Protocol):
     """The part of :class:`server.memory.link.WebLink` that the view uses."""
+
+    directory: Path
+    """The run directory."""
 
     def snapshot(self) -> NDArray[Any]:
         """The newest record, shape (1,), of the robot's types."""
@@ -80,6 +84,7 @@ class SceneView:
         with server.atomic():
             self.robot = _scene_of(server, configuration, link, model_directory)
             self._trails = SceneTrails(server)
+            self._path = ScenePath(server, link.directory)
             self._camera = SceneCamera(server, self.robot.viewpoints, *self.robot.work(None))
             self.gizmo = SceneGizmo(
                 server,
@@ -157,6 +162,7 @@ class SceneView:
 
     def _draw(self, now: float, record: Any) -> None:
         self.robot.draw(now, record)
+        self._path.update(record)
         self._camera.update(*self.robot.work(record))
         enabled = record["outcome"]["state"]["safety"] == Safety.ENABLED
         position, wxyz = self.robot.gizmo_pose(np.array([record["outcome"]]))

@@ -8,7 +8,6 @@ from typing import Any
 
 from playwright.sync_api import BrowserContext, Locator
 
-from benchmarks.console import ROBOT
 from tests.server.console_process import ConsoleProcess, eventually
 
 JSON = dict[str, Any]
@@ -63,10 +62,14 @@ class ConsolePage:
     Args:
         context: the browser session that it belongs to.
         console: the console that serves it.
+
+    Attributes:
+        robot: the one that the console drives.
     """
 
     def __init__(self, context: BrowserContext, console: ConsoleProcess) -> None:
         self.context, self.console = context, console
+        self.robot = "instrument"
         self.page = context.new_page()
         self.page.goto(f"{console.base}/?token={console.token}")
         # The token leaves the address bar, and whatever else stood there with it.
@@ -85,8 +88,16 @@ class ConsolePage:
 
     def call(self, method: str, path: str, body: Any = None) -> int:
         """Call the API with nothing but the browser session's cookie; returns the status."""
-        address = f"{self.console.base}{ROBOT}{path}"
+        address = f"{self.console.base}/api/v1/robots/{self.robot}{path}"
         return self.context.request.fetch(address, method=method, data=body).status
+
+    def state(self) -> JSON:
+        """The newest state, from the API; empty while the server does not answer."""
+        with contextlib.suppress(OSError):
+            state = self.console.call("GET", f"/api/v1/robots/{self.robot}/state")
+            assert isinstance(state, dict)
+            return state
+        return {}
 
     def until(self, shown: str, within_s: float = SLOW_S) -> None:
         """Wait until the chip in the top bar says so."""
@@ -98,14 +109,13 @@ class ConsolePage:
     def take_control(self) -> None:
         """Become the operator by the button, as soon as nobody else is."""
         if not self.shown()["operator"]["you"]:
-            state = self.console.state
-            eventually(lambda: state()["operator"]["name"] is None, "nobody drives", SLOW_S)
+            eventually(lambda: self.state()["operator"]["name"] is None, "nobody drives", SLOW_S)
             self.button("Take control").click()
         eventually(lambda: self.shown()["operator"]["you"], "this page drives", SLOW_S)
 
     def enable(self) -> None:
         """Enable by the button."""
-        if self.console.state()["safety"]["state"] != "ENABLED":
+        if self.state()["safety"]["state"] != "ENABLED":
             self.button("Enable").click()
         self.until("ENABLED")
 
@@ -120,7 +130,7 @@ class ConsolePage:
         assert self.call("PUT", "/teleoperation", as_configured) == 200
         holds = self.page.get_by_role("switch", name="Hold-to-move")
         eventually(lambda: not holds.is_checked(), "the settings are shown", SLOW_S)
-        if self.console.state()["safety"]["state"] == "FAULT":
+        if self.state()["safety"]["state"] == "FAULT":
             assert self.call("POST", "/reset") == 200
             self.until("DISABLED")
         self.enable()

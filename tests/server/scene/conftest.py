@@ -10,7 +10,7 @@ import viser
 from robot.configuration import Configuration
 from server import configuration_file
 from server.scene.view import SceneView
-from tests.server.scene.stage import Recorder, until
+from tests.server.scene.stage import Link, Recorder, until
 from tests.server.scene.viser_browser import ViserBrowser
 
 
@@ -33,7 +33,7 @@ def link(configuration: Configuration) -> Recorder:
 
 @pytest.fixture
 def view(
-    server: viser.ViserServer, configuration: Configuration, link: Recorder
+    server: viser.ViserServer, configuration: Configuration, link: Link
 ) -> Iterator[SceneView]:
     server.scene.reset()
     server.gui.reset()

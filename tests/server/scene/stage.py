@@ -13,11 +13,14 @@ import viser
 import viser.transforms as tf
 from numpy.typing import NDArray
 
+from robot.concentric.kinematics import SOLVED
+from robot.concentric.pair import ArmPair, PairKinematics, start_of
 from robot.configuration import Configuration
 from robot.forward import ForwardKinematics
 from robot.instrument_robot import InstrumentRobot
+from robot.record_types import record_types_of
 from robot.records import RECORD, LeaderKind, Safety
-from robot.rotations import matrix_from_quaternion
+from robot.rotations import matrix_from_quaternion, quaternion_from_matrix
 from robot.urdf import urdf_text
 from server.memory.mapped import MappedReadError
 from server.scene.instrument_scene import InstrumentScene
@@ -33,36 +36,19 @@ class Sample(NamedTuple):
     position: NDArray[np.float64]
 
 
-class Recorder:
+class Link:
     """A link that hands out one record and keeps the samples."""
 
-    def __init__(self, configuration: Configuration) -> None:
+    def __init__(self, configuration: Configuration, record: NDArray[Any]) -> None:
         self.timeout = configuration.teleoperation.gizmo_timeout_ms * 1e-3
-        robot = InstrumentRobot(configuration)
-        self.kinematics = ForwardKinematics(urdf_text(configuration), robot.parameters)
-        self.start: NDArray[np.float64] = robot.initial_state()["x"][0].copy()
-        self.record: NDArray[Any] = np.zeros(1, RECORD)
+        self.directory = Path("a directory without paths")
+        self.record = record
         self.record["header"]["tick"] = 1
-        self.record["input"]["trocar_position"] = configuration.trocar.position_m
         self.record["outcome"]["state"]["safety"] = Safety.ENABLED
         self.board: str = configuration.simulation.board
         self.samples: list[Sample] = []
         self.failures = 0
         self.reads = 0
-        self.move(self.start)
-
-    def move(self, x: NDArray[np.float64]) -> None:
-        """Put robot, commanded and desired tip where the configuration ``x`` has them."""
-        record = self.record.copy()
-        truth, report = record["truth"], record["outcome"]["report"]
-        self.kinematics.fill(truth, x[:7].copy(), float(x[7]), float(x[8]))
-        for word in ("desired", "commanded"):
-            report[f"{word}_position"] = truth["position"]
-            report[f"{word}_wxyz"] = truth["wxyz"]
-        state = record["outcome"]["state"][0]
-        state["tip_position"] = truth["position"][0]
-        matrix_from_quaternion(truth["wxyz"][0], state["tip_rotation"])
-        self.record = record
 
     def snapshot(self) -> NDArray[Any]:
         self.reads += 1
@@ -92,6 +78,64 @@ class Recorder:
         assert timeout_s == pytest.approx(self.timeout)
         assert np.linalg.norm(wxyz) == pytest.approx(1.0)
         self.samples.append(Sample(time.monotonic(), sequence, clutch, position))
+
+
+class Recorder(Link):
+    """A link of the instrument."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        super().__init__(configuration, np.zeros(1, RECORD))
+        robot = InstrumentRobot(configuration)
+        self.kinematics = ForwardKinematics(urdf_text(configuration), robot.parameters)
+        self.start: NDArray[np.float64] = robot.initial_state()["x"][0].copy()
+        self.record["input"]["trocar_position"] = configuration.trocar.position_m
+        self.move(self.start)
+
+    def move(self, x: NDArray[np.float64]) -> None:
+        """Put robot, commanded and desired tip where the configuration ``x`` has them."""
+        record = self.record.copy()
+        truth, report = record["truth"], record["outcome"]["report"]
+        self.kinematics.fill(truth, x[:7].copy(), float(x[7]), float(x[8]))
+        for word in ("desired", "commanded"):
+            report[f"{word}_position"] = truth["position"]
+            report[f"{word}_wxyz"] = truth["wxyz"]
+        state = record["outcome"]["state"][0]
+        state["tip_position"] = truth["position"][0]
+        matrix_from_quaternion(truth["wxyz"][0], state["tip_rotation"])
+        self.record = record
+
+
+class TubeRecorder(Link):
+    """A link of the concentric-tube arms."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        design = configuration.concentric
+        super().__init__(configuration, np.zeros(1, record_types_of(configuration).record))
+        self.pair = ArmPair(design)
+        self.start = start_of(design.starts[design.start - 1])
+        self.move(self.start)
+
+    def move(self, q: NDArray[np.float64]) -> None:
+        """Put true, commanded and desired arms where the configuration ``q`` has them."""
+        found = PairKinematics(self.pair.count)
+        found.q[:] = q
+        assert self.pair.evaluate(found, np.zeros(2 * self.pair.count)) == SOLVED
+        record = self.record.copy()
+        truth, outcome = record["truth"][0], record["outcome"][0]
+        report, state = outcome["report"], outcome["state"]
+        for part in (truth, report, state):
+            part["q"] = q
+            part["position_b"] = found.position[1]
+        for part in (truth, state):
+            part["torsion"] = found.torsion
+        truth["position"] = found.position[0]
+        quaternion_from_matrix(found.rotation[0], truth["wxyz"])
+        quaternion_from_matrix(found.rotation[1], truth["wxyz_b"])
+        for word in ("desired", "commanded"):
+            report[f"{word}_position"] = truth["position"]
+            report[f"{word}_wxyz"] = truth["wxyz"]
+        report["desired_b"], report["stability"] = found.position[1], found.stability
+        self.record = record
 
 
 def instrument_of(view: SceneView) -> InstrumentScene:
