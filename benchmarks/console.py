@@ -20,7 +20,6 @@ from server.memory.link_records import RECORD_RING_FILE
 from server.memory.mapped import MappedRing
 from server.supervision.child_process import module_command, module_environment
 
-ROBOT = "/api/v1/robots/instrument"
 START_S = 120.0
 """The first start of a new version compiles the controller."""
 
@@ -44,8 +43,10 @@ class Console:
         command: it, and what stands before its options.
         environment: variables beside those of this process.
         terminal: descriptor of the terminal in which it runs; None for none.
+        robot: which robot it drives, as the arguments choose it.
 
     Attributes:
+        robot_path: where the API has that robot.
         process: the supervisor.
         base: its address, without a slash at the end.
         token: its token.
@@ -60,8 +61,10 @@ class Console:
         command: tuple[str, ...] = ("console",),
         environment: dict[str, str] | None = None,
         terminal: int | None = None,
+        robot: str = "instrument",
     ) -> None:
         self.directory = directory
+        self.robot_path = f"/api/v1/robots/{robot}"
         # What is measured and tested has no place in the audit log of the robots.
         state = {"XDG_STATE_HOME": str(directory.with_name(f"{directory.name}.state"))}
         self._command, self._environment = command, {**state, **(environment or {})}
@@ -126,7 +129,7 @@ class Console:
     def state(self) -> dict[str, Any]:
         """The state message; empty while the web process does not answer."""
         with contextlib.suppress(OSError):
-            found = self.call("GET", f"{ROBOT}/state")
+            found = self.call("GET", f"{self.robot_path}/state")
             assert isinstance(found, dict)
             return found
         return {}
@@ -146,7 +149,7 @@ class Console:
     def take_lease(self) -> None:
         """Become the operator."""
         self._lease = ""
-        granted = self.call("POST", f"{ROBOT}/lease", {"operator": "benchmark"})
+        granted = self.call("POST", f"{self.robot_path}/lease", {"operator": "benchmark"})
         self._lease = str(granted["lease_id"])
 
     def enable(self) -> None:
@@ -154,7 +157,7 @@ class Console:
         self.wait_until_running()
         if not self._lease:
             self.take_lease()
-        state = self.call("POST", f"{ROBOT}/enable")
+        state = self.call("POST", f"{self.robot_path}/enable")
         if state["safety"]["state"] != "ENABLED":
             raise ConsoleFailed(f"the robot is not enabled: {state['safety']}")
 
@@ -182,12 +185,12 @@ class Console:
             thread.join()
 
     def _go_on(self) -> None:
-        self.call("POST", f"{ROBOT}/lease/renew")
+        self.call("POST", f"{self.robot_path}/lease/renew")
         state = self.state()
         if state["safety"]["state"] != "ENABLED":
             raise ConsoleFailed(f"the robot stopped during the measurement: {state['safety']}")
         if state["path"] is None:
-            self.call("POST", f"{ROBOT}/path", {"experiment": "circle"})
+            self.call("POST", f"{self.robot_path}/path", {"experiment": "circle"})
 
     def drive_on(self, seconds: float) -> None:
         """Wait for so long; raises :class:`ConsoleFailed` if the robot did not go on."""

@@ -1,4 +1,4 @@
-"""The paths of arm A's tip as the console plays them: over time, at a speed that tubes can follow."""
+"""The paths of arm A's tip as the console plays them: at a speed that tubes can follow."""
 
 from __future__ import annotations
 

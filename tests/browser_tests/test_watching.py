@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from playwright.sync_api import BrowserContext, expect
 
-from benchmarks.console import ROBOT
 from tests.browser_tests.console_page import SLOW_S, ConsolePage
 from tests.browser_tests.test_driving import tip_of
 from tests.server.console_process import ConsoleProcess, eventually
@@ -76,10 +75,11 @@ def test_the_api_refuses_a_watcher_to_drive(
         ("/path", {"experiment": "circle"}),
         ("/disable", None),
     ):
-        answer = fresh_context.request.post(f"{console.base}{ROBOT}{path}", data=body)
+        answer = fresh_context.request.post(f"{console.base}{console.robot_path}{path}", data=body)
         assert answer.status == 403
         assert answer.json()["code"] == "not_the_operator"
-    answer = fresh_context.request.put(f"{console.base}{ROBOT}/priority", data={"case": "2"})
+    priority = f"{console.base}{console.robot_path}/priority"
+    answer = fresh_context.request.put(priority, data={"case": "2"})
     assert answer.status == 403
     state = console.state()
     assert tip_of(state) == pytest.approx(start, abs=1e-3)

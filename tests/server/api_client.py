@@ -20,7 +20,7 @@ ROBOT = robot_path("instrument")
 
 
 class ApiClient:
-    """Calls the API under ``/api/v1/robots/instrument``.
+    """Calls the API under the path of the console's robot.
 
     Args:
         console: a running console.
@@ -31,7 +31,9 @@ class ApiClient:
         self.console = console
         token = console.token if token is None else token
         headers = {"Authorization": f"Bearer {token}"} if token else {}
-        self.http = httpx.Client(base_url=console.base + ROBOT, headers=headers, timeout=10.0)
+        self.http = httpx.Client(
+            base_url=console.base + console.robot_path, headers=headers, timeout=10.0
+        )
 
     def close(self) -> None:
         self.http.close()
@@ -94,7 +96,8 @@ class ApiClient:
         sent = {"Authorization": self.http.headers["Authorization"], **headers}
         if "X-Keyhole-Lease" in self.http.headers:
             sent["X-Keyhole-Lease"] = self.http.headers["X-Keyhole-Lease"]
-        address = self.console.base.replace("http://", "ws://") + ROBOT + "/stream" + query
+        address = self.console.base.replace("http://", "ws://")
+        address += self.console.robot_path + "/stream" + query
         # A client that has stopped reading does not see the answer when it closes.
         return connect(
             address, additional_headers=sent, compression=None, proxy=None, close_timeout=0.2

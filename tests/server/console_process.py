@@ -55,6 +55,7 @@ class ConsoleProcess(Console):
         *arguments: str,
         command: tuple[str, ...] = ("console",),
         terminal: int | None = None,
+        robot: str = "instrument",
     ) -> None:
         self.audit = folder / "state" / "keyhole" / "audit"
         data = folder / "data"
@@ -65,6 +66,7 @@ class ConsoleProcess(Console):
             command=command,
             environment={"XDG_DATA_HOME": str(data), "XDG_STATE_HOME": str(folder / "state")},
             terminal=terminal,
+            robot=robot,
         )
 
     def children(self) -> tuple[int, int]:

@@ -212,7 +212,8 @@ def test_what_can_be_read_is_read(watcher: ApiClient) -> None:
     stop = next(r for r in rows if r["state"] == "ENABLED" and r["event"] == "EMERGENCY_STOP")
     assert (stop["next"], stop["request"]) == ("FAULT", True)
     robots = watcher.http.get(watcher.console.base + "/api/v1/robots").json()
-    assert [one["name"] for one in robots] == ["instrument"]
+    assert [one["name"] for one in robots if one["selected"]] == ["instrument"]
+    assert {one["name"] for one in robots} == {"instrument", "concentric"}
 
 
 def test_dexterity_is_computed_where_the_tip_is(watcher: ApiClient) -> None:

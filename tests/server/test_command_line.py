@@ -45,7 +45,7 @@ def test_the_console_is_the_default(
 ) -> None:
     assert main(arguments) == 0
     assert (started[0].port, started[0].no_browser) == (port, no_browser)
-    assert started[0].robot == "instrument"
+    assert console_command.configured(load(), started[0]).robot == "instrument"
 
 
 @pytest.mark.parametrize(
@@ -70,6 +70,18 @@ def test_wrong_arguments_are_refused_in_one_line(
     assert told.err.startswith("keyhole")
     assert words in told.err
     assert told.err.count("\n") == 1
+
+
+def test_the_command_line_chooses_the_robot(started: list[argparse.Namespace]) -> None:
+    assert main(["--robot", "concentric", "--method", "snsqp", "--start", "3"]) == 0
+    assert main(["--robot", "hardware"]) == 0
+    file = load()
+    first, second = (console_command.configured(file, arguments) for arguments in started)
+    assert (first.robot, first.concentric.method, first.concentric.start) == (
+        "concentric", "snsqp", 3,
+    )  # fmt: skip
+    assert not first.drives_hardware
+    assert (second.robot, second.drives_hardware) == ("instrument", True)
 
 
 def test_the_command_line_replaces_what_the_configuration_says(

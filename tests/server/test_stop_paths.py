@@ -15,7 +15,6 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.console import ROBOT
 from robot.records import Safety
 from server.audit.reader import newest
 from server.commands.stop import NothingToStop, execute
@@ -56,7 +55,7 @@ def console(
 def link(console: ConsoleProcess) -> Iterator[WebLink]:
     """Enabled, with a web process that hangs for the length of the test."""
     if console.wait_until_running()["safety"]["state"] == "FAULT":
-        console.call("POST", f"{ROBOT}/reset")
+        console.call("POST", f"{console.robot_path}/reset")
     console.enable()
     web = console.children()[1]
     reader = WebLink(console.directory)
@@ -137,9 +136,9 @@ def test_a_recorder_that_is_killed_misses_no_change(console: ConsoleProcess) -> 
     found = newest(console.audit, 1000, event="process_started")
     recorder = next(one["child"] for one in reversed(found) if one["process"] == "recorder")
     os.kill(recorder, signal.SIGKILL)
-    console.call("POST", f"{ROBOT}/reset")
+    console.call("POST", f"{console.robot_path}/reset")
     console.enable()
-    console.call("POST", f"{ROBOT}/disable")
+    console.call("POST", f"{console.robot_path}/disable")
     expected = [("DISABLED", "RESET"), ("ENABLED", "ENABLE"), ("DISABLED", "DISABLE")]
     eventually(
         lambda: asked_for(console) == before + expected, "the changes stand in the log, once"

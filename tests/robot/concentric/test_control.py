@@ -208,3 +208,18 @@ def test_limits_that_hold_are_named_by_their_bits() -> None:
     assert fastest.any()
     for place in range(2 * TUBES):
         assert drive.report.limits_active >> place & 1 == fastest[place]
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_target_out_of_reach_is_met_with_rest_not_with_shaking(place: int) -> None:
+    drive = Drive("hqp", configurations()[place], 0.01)
+    away, rates = np.array([0.06, 0.0, 0.0]), []
+    for step in range(1600):
+        drive.step(drive.first + away * min(step / 1200.0, 1.0))
+        if step >= 1500:
+            rates.append(drive.report.rates.copy())
+    assert np.linalg.norm(drive.report.tracking_after) > 0.01
+    assert np.linalg.norm(drive.report.relative_after) < 5e-5
+    changes = np.abs(np.diff(rates, axis=0)).reshape(-1, 4, TUBES)
+    assert np.sqrt(np.mean(changes[:, 1::2] ** 2)) < 0.02  # rad/s from tick to tick; caps 0.5
+    assert np.sqrt(np.mean(changes[:, ::2] ** 2)) < 2e-4  # m/s; the cap is 5e-3

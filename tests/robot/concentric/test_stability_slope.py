@@ -62,7 +62,7 @@ def test_hqp_slides_along_the_margin_instead_of_running_into_it(rng: np.random.G
         desired = now.position[0] + rng.uniform(-0.02, 0.02, 3)
         for _ in range(15):
             status = chosen.step(now, desired, relative, np.zeros(3), after, report)
-            assert status == ControlStatus.SOLVED
+            assert status in (ControlStatus.SOLVED, ControlStatus.OUT_OF_REACH)
             assert after.stability.min() >= min(margin, now.stability.min())
             lowest = min(lowest, after.stability.min())
             now, after = after, now

@@ -7,6 +7,7 @@ import json
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
+from urllib.parse import quote
 
 import httpx
 import numpy as np
@@ -130,7 +131,7 @@ def call(watched: Watched, data: Any) -> None:
     for one in operation.get("parameters", ()):
         if one["in"] == "path":
             given_text = data.draw(TEXTS.filter(lambda text: text not in ("", "..")))
-            path = path.replace("{" + one["name"] + "}", httpx.URL(path=given_text).path or "x")
+            path = path.replace("{" + one["name"] + "}", quote(given_text, safe=""))
     headers = {**watched.headers, "Content-Type": data.draw(HEADERS)}
     if data.draw(st.booleans()):
         headers.pop("X-Keyhole-Lease", None)

@@ -13,6 +13,7 @@ from server.report.results import SETTINGS, Results, tasks
 from server.report.targets import TARGETS
 from server.study.folder import StudyFolder
 from server.study.study import StudyResult
+from server.study.task import Task
 from tests.server import headless
 
 COMMAND = ["report", "--plant", "kinematic", "--quick"]
@@ -123,7 +124,7 @@ def test_a_missing_run_leaves_a_gap_and_no_verdict(folder: Path) -> None:
     from server.report.page import Conditions, page
 
     configuration = headless.configuration()
-    study = StudyResult({})
+    study: StudyResult[Task] = StudyResult({})
     conditions = Conditions("physics", "paper", [1], None, None, "0", "mark", "again", ["<all>"])
     text = page(Results(study, StudyFolder(folder)), configuration, conditions)
     words = " ".join(Page(text).words)

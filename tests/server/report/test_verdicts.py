@@ -48,17 +48,17 @@ def document(task: Task) -> dict[str, Any]:
     }
 
 
-def study() -> StudyResult:
+def study() -> StudyResult[Task]:
     found = StudyResult(dict.fromkeys(tasks("physics", "paper", SEEDS, None), ""))
     found.documents = {task: document(task) for task in found.names}
     return found
 
 
-def judged(found: StudyResult, tmp_path: Path, whole: bool = True) -> list[Verdict]:
+def judged(found: StudyResult[Task], tmp_path: Path, whole: bool = True) -> list[Verdict]:
     return verdicts(Results(found, StudyFolder(tmp_path)), whole)
 
 
-def put(found: StudyResult, setting: Setting, seed: int, place: str, value: Any) -> None:
+def put(found: StudyResult[Task], setting: Setting, seed: int, place: str, value: Any) -> None:
     """Put a value into the figures of one run."""
     (task,) = [
         one

@@ -226,7 +226,7 @@ def test_the_first_view_has_endoscope_and_gizmo_in_it(
     first = VIEWPOINTS.view(VIEWPOINTS.home, truth["position"], truth["position_b"])
     assert server.initial_camera.position == pytest.approx(first.position)
     assert server.initial_camera.look_at == pytest.approx(first.look_at)
-    for place in ([0.0, 0.0, -0.1], truth["position"] + [0.0, 0.0, 0.06]):
+    for place in ([0.0, 0.0, -0.07], truth["position"] + [0.0, 0.0, 0.06]):
         # The page's scene can be narrower than it is high.
         assert np.abs(seen(first, np.array(place))).max() < 0.95
         assert abs(seen(first, np.array(place))[0]) < 0.6
