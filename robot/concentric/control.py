@@ -29,6 +29,8 @@ RELATIVE_CLOSE = 2e-6
 """Relative error that a step may add without another correction, m."""
 RELATIVE_ALLOWED = 2e-5
 """Relative error beyond which a step is halved, m."""
+DAMPING_PER_STEP, DAMPING_MAX = 600.0, 1.0
+"""Damping of hqp's levels for each metre that A is asked to go in an iteration, and its largest."""
 STABILITY_NEAR = 0.4
 """Stability determinant below which hqp watches how it falls."""
 STABILITY_KEPT = 1.2
@@ -37,6 +39,7 @@ _STABILITY_SHARE = 0.5
 """How much of what is left to that may fall in an iteration."""
 _MOVING = 1e-4
 """Step of A, m, from which on a determinant below what is kept has to rise."""
+_LENGTH_TOLERANCE = 1e-12
 _TOUCH = 1e-9
 
 
@@ -50,6 +53,7 @@ class ControlStatus(IntEnum):
     UNSTABLE = 4
     SOLVER_FAILED = 5
     DRIFTING = 6
+    OUT_OF_REACH = 7
 
 
 _NOT_CONVERGED = ControlStatus.NOT_CONVERGED
@@ -62,6 +66,7 @@ REASONS: dict[ControlStatus, str] = {
     ControlStatus.UNSTABLE: "the tubes are about to snap",
     ControlStatus.SOLVER_FAILED: "the solver goes in circles",
     ControlStatus.DRIFTING: "no step toward the target keeps the relative position",
+    ControlStatus.OUT_OF_REACH: "no step brings A nearer to the target",
 }
 """The status in words."""
 
@@ -125,7 +130,7 @@ class PairControl:
         self._margin = design.limits.stability_margin
         self._problem = RateProblem(self.proximal, design.limits.rotation_speed_rad_s, period)
         self._method: Method = method_named(method or design.method, self._problem)
-        self._relative_target = np.zeros(3)
+        self._relative_target, self._tracking_target = np.zeros(3), np.zeros(3)
         self._taken_back = min(design.relative_gain_per_s * period, 1.0)
         self._asked = np.zeros(4 * self.pair.count)
         self._guess = np.zeros(2 * self.pair.count)
@@ -186,7 +191,9 @@ class PairControl:
         self._linearise(now)
         if self._method.corrects:
             self._watch_stability(now)
+            problem.damping = min(DAMPING_MAX, DAMPING_PER_STEP * self._pace())
         self._relative_target[:] = now.relative + self.period * problem.relative_velocity
+        self._tracking_target[:] = now.position[0] + self.period * problem.tracking_velocity
         return self._solve()
 
     def _watch_stability(self, now: PairKinematics) -> None:
@@ -197,7 +204,7 @@ class PairControl:
         that there are always rates that do; where A is not to move, none have to.
         """
         n, problem = self.pair.count, self._problem
-        pace = self.period * math.sqrt(float(problem.tracking_velocity @ problem.tracking_velocity))
+        pace = self._pace()
         for arm in range(2):
             problem.stability_fall[arm] = math.inf
             if now.stability[arm] >= STABILITY_NEAR:
@@ -216,6 +223,11 @@ class PairControl:
                 able = 0.5 * problem.rotation_speed * float(np.abs(slope[n:]).sum())
                 fall = max(fall * min(pace / _MOVING, 1.0), -able)
             problem.stability_fall[arm] = fall
+
+    def _pace(self) -> float:
+        """How far A is asked to go in this iteration, m."""
+        wanted = self._problem.tracking_velocity
+        return self.period * math.sqrt(float(wanted @ wanted))
 
     def _linearise(self, at: PairKinematics) -> None:
         self._problem.relative_jacobian[:] = at.relative_jacobian
@@ -241,8 +253,9 @@ class PairControl:
         """Integrate; refuse what does not converge or snaps.
 
         A method that corrects takes back what curvature adds to the relative error. Where limits or
-        a singular pose leave no way to do so, a share of the step is made: what curvature adds goes
-        with the square of the share.
+        a singular pose leave no way to do so, or where the step overshoots, a share of it is made:
+        what curvature adds goes with the square of the share. Without that a target out of reach
+        shakes the tubes to and fro between ticks.
         """
         if not self._method.corrects:
             return self._checked(now, after) if self._try(now, after) else _NOT_CONVERGED
@@ -287,7 +300,17 @@ class PairControl:
                 return status
         if off > max(RELATIVE_ALLOWED, before):
             return ControlStatus.DRIFTING
+        if before <= RELATIVE_ALLOWED and self._goes_away(now, after):
+            return ControlStatus.OUT_OF_REACH
         return self._checked(now, after)
+
+    def _goes_away(self, now: PairKinematics, after: PairKinematics) -> bool:
+        """Whether A ends further from where it was asked to than it began, without need."""
+        if self._problem.stability_fall.min() < 0.0:
+            return False
+        asked = self._tracking_target
+        began, ended = _distance(asked, now.position[0]), _distance(asked, after.position[0])
+        return ended > began + _LENGTH_TOLERANCE
 
     def _correct(self, now: PairKinematics, after: PairKinematics, share: float) -> ControlStatus:
         """Rates near by, linearised at the end of the step, within the limits of its beginning."""
@@ -300,7 +323,7 @@ class PairControl:
         problem.relative_velocity -= after.relative
         problem.relative_velocity /= self.period
         problem.relative_velocity += after.relative_jacobian @ problem.rates
-        problem.preferred[:] = problem.rates
+        problem.preferred[:], problem.damping = problem.rates, 0.0
         return self._solve()
 
     def _try(self, now: PairKinematics, after: PairKinematics) -> bool:
