@@ -15,6 +15,7 @@ BENCHMARKS = {
     "tick": ("benchmarks.tick", "the controller tick beside a pink step"),
     "plant": ("benchmarks.plant", "the simulated robot beside its bare engine"),
     "hardware": ("benchmarks.hardware", "servo bus and stylus, from the hand to the servos"),
+    "tubes": ("benchmarks.tubes", "concentric tubes beside a general solver, and a whole tick"),
     "loop": ("benchmarks.loop_lateness", "lateness of the control process beside an empty loop"),
 }
 """Names, modules with ``measure(configuration, seconds)``, titles."""

@@ -80,7 +80,14 @@ class _Arms:
         self._found = [PairKinematics(len(design.tubes)) for _ in range(2)]
         self.position, self.rotation = np.zeros((2, 3)), np.zeros((2, 3, 3))
         self.torsion = np.zeros(2 * len(design.tubes))
-        self.snapped = 0
+
+    def wake_at(self, q: np.ndarray) -> bool:
+        """Stand at ``q`` (4n,) as tubes put together untwisted do; False where none do."""
+        for pair, found in zip(self._pairs, self._found, strict=True):
+            found.q[:] = q
+            if pair.evaluate_cold(found) != SOLVED:
+                return False
+        return self.stand_at(q)
 
     def stand_at(self, q: np.ndarray) -> bool:
         """Follow the arms to ``q`` (4n,); a branch that ends snaps to another one.
@@ -92,8 +99,7 @@ class _Arms:
         for arm, (pair, found) in enumerate(zip(self._pairs, self._found, strict=True)):
             found.q[:] = q
             if pair.evaluate(found, found.torsion.copy()) != SOLVED:
-                self.snapped += 1
-                if pair.evaluate(found, np.zeros(2 * n)) != SOLVED:
+                if pair.evaluate_cold(found) != SOLVED:
                     return False
             self.position[arm], self.rotation[arm] = found.position[arm], found.rotation[arm]
             self.torsion[n * arm : n * (arm + 1)] = found.torsion[n * arm : n * (arm + 1)]
@@ -123,7 +129,7 @@ class TubePlant(Wireless):
         lag = self._preset.lag_s
         self._share = 1.0 if lag <= 0.0 else 1.0 - math.exp(-self._period_s / lag)
         self._arms = _Arms(design, self._preset, simulation.seed)
-        self._stands = self._arms.stand_at(self._q)
+        self._stands = self._arms.wake_at(self._q)
         self._encode()
 
     def _actuators(self) -> tuple[Actuator, ...]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from robot.compiled import compiled
-from robot.concentric.control import ControlReport, ControlStatus, PairControl
+from robot.concentric.control import REASONS, ControlReport, ControlStatus, PairControl
 from robot.concentric.design import METHODS
 from robot.concentric.kinematics import SOLVED
 from robot.concentric.pair import ArmPair, PairKinematics, start_of
@@ -75,7 +75,9 @@ class ConcentricRobot:
         self.parameters = parameters(configuration)
         self.types = concentric_types(len(design.tubes))
         period = 1.0 / design.rate_hz
-        self._controls = tuple(PairControl(design, period, method) for method in METHODS)
+        self._controls = tuple(
+            PairControl(design, period, method, keeps_limits=True) for method in METHODS
+        )
         self.pair: ArmPair = self._controls[0].pair
         tubes = self.pair.count
         self._now, self._after = PairKinematics(tubes), PairKinematics(tubes)
@@ -90,7 +92,7 @@ class ConcentricRobot:
         found.q[:] = start_of(design.starts[design.start - 1])
         for arm in range(2):
             check_configuration(found.q[2 * tubes * arm : 2 * tubes * (arm + 1)], self.pair.tubes)
-        if self.pair.evaluate(found, np.zeros(2 * tubes)) != SOLVED:
+        if self.pair.evaluate_cold(found) != SOLVED:
             raise UnsolvedStart(design.start)
         return found
 
@@ -225,6 +227,6 @@ def describe_limits(bits: int, status: int, tubes: int) -> list[str]:
             for axis in range(2 * tubes)
             if bits >> (2 * tubes * kind + axis) & 1
         ]
-    if status == ControlStatus.INFEASIBLE:
-        words.append("the method finds no rates that keep both B's place and the limits")
+    if status not in (ControlStatus.SOLVED, ControlStatus.UNSTABLE):
+        words.append(REASONS[ControlStatus(status)])
     return words

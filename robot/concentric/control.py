@@ -19,6 +19,7 @@ from robot.concentric.methods.choice import Method, method_named
 from robot.concentric.methods.rate_problem import RateProblem, Solution
 from robot.concentric.pair import ArmPair, PairKinematics
 from robot.concentric.proximal import Proximal, settle_inside
+from robot.concentric.rate_limits import limits_active, share_within
 from robot.concentric.stability_slope import stability_slope
 
 CORRECTIONS = 3
@@ -39,8 +40,10 @@ _STABILITY_SHARE = 0.5
 """How much of what is left to that may fall in an iteration."""
 _MOVING = 1e-4
 """Step of A, m, from which on a determinant below what is kept has to rise."""
+RELATIVE_LOOSE = 5e-5
+"""Relative error that a step may leave, m, where no share of it leaves less: where a curved part
+begins at a tube's end the Jacobian jumps, and no correction holds on both sides."""
 _LENGTH_TOLERANCE = 1e-12
-_TOUCH = 1e-9
 
 
 class ControlStatus(IntEnum):
@@ -113,13 +116,22 @@ class PairControl:
         method: name of the method.
     """
 
-    def __init__(self, design: Concentric, period: float, method: str | None = None) -> None:
+    def __init__(
+        self,
+        design: Concentric,
+        period: float,
+        method: str | None = None,
+        *,
+        keeps_limits: bool = False,
+    ) -> None:
         """Build it.
 
         Args:
             design: tubes, gains and limits.
             period: of an iteration, s.
             method: name of the method; None for the configuration's.
+            keeps_limits: slow the whole motion down where the paper's methods would break a limit
+                that they do not know: gaps between tubes, rotation speeds, for NSPWLN all of them.
 
         Raises:
             UnknownName: no such method.
@@ -128,11 +140,13 @@ class PairControl:
         self.pair, self.proximal, self.period = ArmPair(design), Proximal(design), period
         self._gains = design.relative_gain_per_s, design.tracking_gain_per_s
         self._margin = design.limits.stability_margin
+        self._keeps_limits = keeps_limits
         self._problem = RateProblem(self.proximal, design.limits.rotation_speed_rad_s, period)
         self._method: Method = method_named(method or design.method, self._problem)
         self._relative_target, self._tracking_target = np.zeros(3), np.zeros(3)
         self._taken_back = min(design.relative_gain_per_s * period, 1.0)
-        self._asked = np.zeros(4 * self.pair.count)
+        self._asked, self._spare = np.zeros(4 * self.pair.count), np.zeros(4 * self.pair.count)
+        self._has_spare = False
         self._guess = np.zeros(2 * self.pair.count)
 
     @property
@@ -162,6 +176,16 @@ class PairControl:
         np.subtract(relative, now.relative, out=report.relative_before)
         np.subtract(desired, now.position[0], out=report.tracking_before)
         status = self._ask(now, feed_forward, report)
+        if self._keeps_limits and not self._method.corrects:
+            problem = self._problem
+            problem.rates *= share_within(
+                problem.rates,
+                problem.box_lower,
+                problem.box_upper,
+                problem.gap_lower,
+                problem.gap_upper,
+                problem.rotation_speed,
+            )
         if status == ControlStatus.SOLVED:
             status = self._move(now, relative, after, report)
         if status != ControlStatus.SOLVED:
@@ -260,6 +284,7 @@ class PairControl:
         if not self._method.corrects:
             return self._checked(now, after) if self._try(now, after) else _NOT_CONVERGED
         share, status = 1.0, _NOT_CONVERGED
+        self._has_spare = False
         self._asked[:] = self._problem.rates
         for _ in range(SHARES):
             np.multiply(self._asked, share, out=self._problem.rates)
@@ -267,6 +292,9 @@ class PairControl:
             if status == ControlStatus.SOLVED:
                 break
             share *= 0.5
+        if status != ControlStatus.SOLVED and self._has_spare:
+            self._problem.rates[:] = self._spare
+            return ControlStatus.SOLVED if self._try(now, after) else _NOT_CONVERGED
         return status
 
     def _checked(self, now: PairKinematics, after: PairKinematics) -> ControlStatus:
@@ -299,6 +327,9 @@ class PairControl:
             if status != ControlStatus.SOLVED:
                 return status
         if off > max(RELATIVE_ALLOWED, before):
+            if off <= RELATIVE_LOOSE and not self._has_spare and not self._goes_away(now, after):
+                self._has_spare = self._checked(now, after) == ControlStatus.SOLVED
+                self._spare[:] = self._problem.rates
             return ControlStatus.DRIFTING
         if before <= RELATIVE_ALLOWED and self._goes_away(now, after):
             return ControlStatus.OUT_OF_REACH
@@ -316,13 +347,18 @@ class PairControl:
         """Rates near by, linearised at the end of the step, within the limits of its beginning."""
         problem = self._problem
         self._linearise(after)
-        np.matmul(after.tracking_jacobian, problem.rates, out=problem.tracking_velocity)
+        if share < 1.0:
+            problem.relative_jacobian += now.relative_jacobian
+            problem.tracking_jacobian += now.tracking_jacobian
+            problem.relative_jacobian *= 0.5
+            problem.tracking_jacobian *= 0.5
+        np.matmul(problem.tracking_jacobian, problem.rates, out=problem.tracking_velocity)
         np.subtract(self._relative_target, now.relative, out=problem.relative_velocity)
         problem.relative_velocity *= share
         problem.relative_velocity += now.relative
         problem.relative_velocity -= after.relative
         problem.relative_velocity /= self.period
-        problem.relative_velocity += after.relative_jacobian @ problem.rates
+        problem.relative_velocity += problem.relative_jacobian @ problem.rates
         problem.preferred[:], problem.damping = problem.rates, 0.0
         return self._solve()
 
@@ -365,7 +401,7 @@ class PairControl:
         )
         report.peak_translation = float(np.abs(problem.rates[problem.translations]).max())
         report.peak_rotation = float(np.abs(problem.rates[problem.rotations]).max())
-        report.limits_active = _limits_active(
+        report.limits_active = limits_active(
             problem.rates,
             problem.box_lower,
             problem.box_upper,
@@ -387,36 +423,3 @@ def _distance(first: np.ndarray, second: np.ndarray) -> float:
     for k in range(first.size):
         total += (first[k] - second[k]) ** 2
     return math.sqrt(total)
-
-
-@compiled
-def _limits_active(
-    rates: np.ndarray,
-    box_lower: np.ndarray,
-    box_upper: np.ndarray,
-    gap_lower: np.ndarray,
-    gap_upper: np.ndarray,
-    speed: float,
-    rotation_speed: float,
-) -> int:
-    """Bits of ``ControlReport.limits_active``."""
-    bits = 0
-    n = rates.size // 4
-    for arm in range(2):
-        for i in range(n):
-            place, bit = 2 * n * arm + i, n * arm + i
-            rate = rates[place]
-            if abs(rate) >= speed * (1.0 - _TOUCH):
-                bits |= 1 << bit
-            held = False
-            for outer in range(max(i, 1), min(i + 2, n)):
-                gap = (n - 1) * arm + outer - 1
-                opening = rates[2 * n * arm + outer] - rates[2 * n * arm + outer - 1]
-                slack = _TOUCH * speed
-                held = held or opening <= gap_lower[gap] + slack
-                held = held or opening >= gap_upper[gap] - slack
-            if held:
-                bits |= 1 << (2 * n + bit)
-            if abs(rates[place + n]) >= rotation_speed * (1.0 - _TOUCH):
-                bits |= 1 << (4 * n + bit)
-    return bits

@@ -186,25 +186,38 @@ def test_a_target_far_away_is_refused(drive: TubeDrive) -> None:
 
 
 def test_what_leads_toward_snapping_pauses_and_the_way_back_is_open() -> None:
-    # A margin no configuration keeps: every step that lowers the determinant is one too many.
-    robot = ConcentricRobot(concentric({"stability_margin": 0.999}, start=2))
+    # A margin above where the arms stand: every step that lowers the determinant is one too many.
+    design = concentric().concentric
+    apart, turned = (-300.0, -200.0, -100.0), (150.0, 0.0, 0.0)
+    twisted = design.starts[0].model_copy(
+        update={
+            "translations_a_mm": apart,
+            "translations_b_mm": apart,
+            "rotations_a_deg": turned,
+            "rotations_b_deg": turned,
+        }
+    )
+    robot = ConcentricRobot(concentric({"stability_margin": 10.0}, starts=(twisted,)))
     drive = TubeDrive(robot, "nspqp")
-    drive.enable()
     start = drive.tip
-    directions = [*np.eye(3), *-np.eye(3)]
-    seen = set()
-    for direction in directions:
+    paused, moved = 0, 0
+    for direction in (*np.eye(3), *-np.eye(3)):
         drive.enable()
+        before = drive.outcome[0]["report"]["stability"].copy()
+        there = drive.q
         drive.lead_to(start + 0.02 * direction)
-        for _ in range(150):
-            drive.tick()
+        for _ in range(50):
+            outcome = drive.tick()
+            assert np.all(outcome["report"]["stability"] >= before)
             if drive.safety != Safety.ENABLED:
+                assert (drive.safety, reason(drive)) == (Safety.PAUSED, Event.NEAR_SNAPPING)
+                paused += 1
                 break
-        seen.add(reason(drive))
+        moved += not np.array_equal(drive.q, there)
         drive.input["leader"]["clutch"] = 0
         drive.tick()
-    assert Event.NEAR_SNAPPING in seen
-    assert drive.safety != Safety.FAULT
+    assert paused > 0
+    assert moved > 0
 
 
 def test_a_start_outside_of_what_tubes_can_be_is_refused_by_name() -> None:
