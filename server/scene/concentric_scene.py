@@ -67,7 +67,7 @@ class ConcentricScene(RobotScene):
                 Axes(f"{FRAMES}/tip A", 0.012, 0.0003, "A", "center-right"),
                 Axes(f"{FRAMES}/tip B", 0.012, 0.0003, "B", "center-left"),
             ],
-            [Axes(f"{FRAMES}/face", 0.02, 0.0004, "face")],
+            [Axes(f"{FRAMES}/face", 0.02, 0.0004)],
         )
         self.frames.visible = True
 

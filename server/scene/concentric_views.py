@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from server.scene.camera import FIELD_OF_VIEW, View, Viewpoints
 
 OVERVIEW, TIPS, SIDE, ENDOSCOPE = "Overview", "Tips", "Side", "Endoscope"
-AHEAD = np.array([0.0, 0.0, 0.065])
+AHEAD = np.array([0.0, 0.0, 0.08])
 """The gizmo's arrow at A's tip is in view too, m."""
-REAR = np.array([0.0, 0.0, -0.10])
+REAR = np.array([0.0, 0.0, -0.075])
 """What is still to be seen behind the face, m."""
 ROOM = 1.06
 """How much more than the arms is in view."""

@@ -35,7 +35,7 @@ class SceneRelative:
             f"{ROOT}/vector",
             np.zeros((1, 2, 3)),
             TRUE,
-            thickness=2.5,
+            thickness=3.5,
             thickness_units="screen",
         )
         self.label = server.scene.add_label(
