@@ -344,7 +344,10 @@ class PairControl:
         return ended > began + _LENGTH_TOLERANCE
 
     def _correct(self, now: PairKinematics, after: PairKinematics, share: float) -> ControlStatus:
-        """Rates near by, linearised at the end of the step, within the limits of its beginning."""
+        """Rates near by, linearised at the end of the step, within the limits of its beginning.
+
+        Where that did not do for the whole step, the mean of both ends is used for its shares.
+        """
         problem = self._problem
         self._linearise(after)
         if share < 1.0:
