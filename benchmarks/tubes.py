@@ -2,7 +2,8 @@
 
 Both run in the same process, turn by turn, so that whatever slows the machine slows both. Ours is
 everything: torsion, tip, Jacobian, stability, from the torsion of the tick before. The peer is
-scipy: the same equations by ``solve_ivp`` and ``root`` from the same guess, for the tip alone.
+scipy: the same equations by ``solve_ivp`` and ``root`` from the same guess, for the tip alone. A
+whole tick of both arms, by each method, stands beside the period that the console has for it.
 """
 
 from __future__ import annotations
@@ -16,10 +17,16 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
 from benchmarks.tick import percentiles
+from hardware.tube_plant import TubePlant
+from robot.concentric.concentric_robot import ConcentricRobot
+from robot.concentric.design import METHODS
 from robot.concentric.kinematics import SOLVED, solve_arm
 from robot.concentric.stability import BranchFollower, TubesSnap
 from robot.concentric.tubes import tube_array
 from robot.configuration import Configuration
+from robot.records import Request, Safety
+from scenes.experiments.tube_playing import played
+from server.control.concentric_loop import ConcentricLoop
 
 OVERLAPS_MM = (0, 50, 80)
 """Curved overlap, summed over the pairs of tubes."""
@@ -128,6 +135,32 @@ def _alternate(tubes: np.ndarray, overlap: float, ticks: int, turns: int) -> dic
     }
 
 
+def _whole_ticks(configuration: Configuration, ticks: int) -> dict[str, Any]:
+    """Ticks of both arms by each method on the rectangle, and the loop's period beside them."""
+    period_us = 1e6 / configuration.concentric.rate_hz
+    figures: dict[str, Any] = {"period_us": period_us}
+    for method in METHODS:
+        design = configuration.concentric.model_copy(update={"method": method})
+        update = {"robot": "concentric", "concentric": design}
+        chosen = configuration.model_copy(update=update)
+        robot = ConcentricRobot(chosen)
+        plant = TubePlant(chosen, robot.initial_state()["q"][0])
+        loop = ConcentricLoop(robot, plant, chosen)
+        loop.request = Request.ENABLE
+        loop.step()
+        loop.start_path(played("rectangle"))
+        took = []
+        for index in range(ticks + _WARM_UP):
+            loop.step()
+            if index >= _WARM_UP:
+                took.append(int(loop.record["header"]["tick_ns"][0]))
+        if loop.safety != Safety.ENABLED:
+            raise TubesSnap(loop.record["truth"]["q"][0])
+        tick_us = percentiles(took)
+        figures[method] = {"tick_us": tick_us, "share_of_period_p99": tick_us["p99"] / period_us}
+    return figures
+
+
 def measure(configuration: Configuration, seconds: float) -> dict[str, Any]:
     """Measure.
 
@@ -137,7 +170,8 @@ def measure(configuration: Configuration, seconds: float) -> dict[str, Any]:
 
     Returns:
         For each curved overlap (``overlap_0_mm`` ...): ``arm_us`` and ``scipy_us`` with p50 and
-        p99, ``ratio_p50``, ``tips_apart_mm``; and ``ticks`` of ours, ``turns`` of the peer.
+        p99, ``ratio_p50``, ``tips_apart_mm``; ``tick``: for each method the whole tick of both
+        arms beside the loop's period; and ``ticks`` of ours, ``turns`` of the peer.
     """
     tubes = tube_array(configuration.concentric.tubes)
     turns = min(max(round(seconds * 5.0), 3), 100)
@@ -146,4 +180,5 @@ def measure(configuration: Configuration, seconds: float) -> dict[str, Any]:
         f"overlap_{overlap}_mm": _alternate(tubes, overlap * 1e-3, ticks, turns)
         for overlap in OVERLAPS_MM
     }
+    document["tick"] = _whole_ticks(configuration, min(ticks, 2000))
     return {**document, "ticks": ticks, "turns": turns}
