@@ -20,7 +20,7 @@ const limitOf = (value, unit) => [{ value, label: `limit ${value}${unit}`, kind:
 /** Each tube's translation between its bounds, as in the paper's figure 2. */
 const translations = (arm) => ({
   key: `tubes-${ARMS[arm]}`,
-  title: `Tubes of ${ARMS[arm]}`,
+  title: `Tubes ${ARMS[arm]}`,
   unit: "mm",
   share: 1.4,
   span: (low, high) => {
