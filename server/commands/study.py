@@ -19,7 +19,7 @@ from server.run.options import COMPENSATIONS, PLANTS, PRESETS
 from server.study.folder import StudyFolder
 from server.study.local_workers import default_jobs
 from server.study.study import TABLE, Study, StudyResult
-from server.study.task import Sweep
+from server.study.task import Sweep, Task
 
 _SEEDS_MAX = 10_000
 
@@ -148,7 +148,7 @@ def _sweep(arguments: argparse.Namespace, configuration: Configuration) -> Sweep
     )
 
 
-def tell(result: StudyResult, folder: StudyFolder) -> None:
+def tell(result: StudyResult[Task], folder: StudyFolder) -> None:
     """Print the table, what failed, and where everything is."""
     documents = result.in_order()
     if documents:

@@ -75,7 +75,7 @@ class Results:
         folder: where its files are.
     """
 
-    def __init__(self, study: StudyResult, folder: StudyFolder) -> None:
+    def __init__(self, study: StudyResult[Task], folder: StudyFolder) -> None:
         self._study, self._folder = study, folder
 
     def _of(self, setting: Setting) -> list[Task]:

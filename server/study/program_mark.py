@@ -8,7 +8,11 @@ from pathlib import Path
 
 _ROOT = Path(__file__).resolve().parents[2]
 _DECIDING = ("robot", "scenes", "hardware", "server/control")
-_DECIDING_FILES = ("server/run/headless.py", "server/run/figures.py", "server/study/work.py")
+_DECIDING_FILES = (
+    *("server/run/headless.py", "server/run/figures.py"),
+    *("server/run/tube_run.py", "server/run/tube_figures.py"),
+    *("server/study/work.py", "server/study/task.py"),
+)
 _KINDS = (".py", ".toml", ".csv")
 
 

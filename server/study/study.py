@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from robot.configuration import Configuration
 from server.commands.progress_bar import ProgressBar, clock
@@ -15,14 +15,14 @@ from server.study.cluster_workers import cluster_outcomes
 from server.study.folder import StudyFolder
 from server.study.local_workers import local_outcomes
 from server.study.program_mark import program_mark
-from server.study.task import Task
-from server.study.work import Outcome, Work
+from server.study.work import Outcome, StudyTask, Work
 
 TABLE = "table.csv"
+AnyTask = TypeVar("AnyTask", bound=StudyTask)
 
 
 @dataclass
-class StudyResult:
+class StudyResult(Generic[AnyTask]):
     """What a study has come to.
 
     Attributes:
@@ -32,9 +32,9 @@ class StudyResult:
         stopped: whether it was stopped before its end.
     """
 
-    names: dict[Task, str]
-    documents: dict[Task, dict[str, Any]] = field(default_factory=dict)
-    failures: dict[Task, str] = field(default_factory=dict)
+    names: dict[AnyTask, str]
+    documents: dict[AnyTask, dict[str, Any]] = field(default_factory=dict)
+    failures: dict[AnyTask, str] = field(default_factory=dict)
     stopped: bool = False
 
     def in_order(self) -> list[dict[str, Any]]:
@@ -43,7 +43,7 @@ class StudyResult:
 
 
 @dataclass(frozen=True)
-class Study:
+class Study(Generic[AnyTask]):
     """What to run, under what, and where the results go.
 
     Attributes:
@@ -53,23 +53,25 @@ class Study:
         folder: where the results go.
         jobs: processes on this machine.
         scheduler: address of a Dask scheduler, or None for this machine.
+        table: writes the figures of all runs as one CSV.
     """
 
-    tasks: Sequence[Task]
+    tasks: Sequence[AnyTask]
     configuration: Configuration
     calibration: str | None
     folder: StudyFolder
     jobs: int
     scheduler: str | None = None
+    table: Callable[[Iterable[dict[str, Any]]], str] = csv_text
 
-    def run(self, stopped: Callable[[], bool]) -> StudyResult:
+    def run(self, stopped: Callable[[], bool]) -> StudyResult[AnyTask]:
         """Do what is not yet done, and write the table.
 
         Args:
             stopped: asked now and then; once it says yes, the study ends in order.
         """
         names = {task: task.name(self.configuration, self.calibration) for task in self.tasks}
-        result = StudyResult(names)
+        result: StudyResult[AnyTask] = StudyResult(names)
         for task, name in names.items():
             document = self.folder.document(name)
             if document is not None:
@@ -78,22 +80,26 @@ class Study:
         if left:
             self._do(left, result, stopped)
         result.stopped = stopped()
-        self.folder.write(TABLE, csv_text(result.in_order()).encode())
+        self.folder.write(TABLE, self.table(result.in_order()).encode())
         return result
 
-    def _do(self, left: list[Task], result: StudyResult, stopped: Callable[[], bool]) -> None:
+    def _do(
+        self, left: list[AnyTask], result: StudyResult[AnyTask], stopped: Callable[[], bool]
+    ) -> None:
         text = self.configuration.model_dump_json()
         works = [
             Work(task, result.names[task], text, self.calibration, program_mark()) for task in left
         ]
-        progress = _Progress(left, self.configuration, len(result.names) - len(left))
+        named = {result.names[task]: task for task in left}
+        weights = {result.names[task]: task.weight(self.configuration) for task in left}
+        progress = _Progress(weights, len(result.names) - len(left))
         for work, outcome in self._outcomes(works, stopped):
             if outcome.document is not None:
                 self.folder.keep(work.name, outcome)
-                result.documents[work.task] = outcome.document
+                result.documents[named[work.name]] = outcome.document
             elif outcome.failure:
-                result.failures[work.task] = outcome.failure
-            progress.done(work.task, outcome)
+                result.failures[named[work.name]] = outcome.failure
+            progress.done(work, outcome)
         progress.end()
 
     def _outcomes(
@@ -107,11 +113,11 @@ class Study:
 class _Progress:
     """A bar where somebody looks, a line a run elsewhere; the longer a path, the more it counts."""
 
-    def __init__(self, tasks: Sequence[Task], configuration: Configuration, before: int) -> None:
-        self._weights = {task: task.options(configuration).path.duration_s for task in tasks}
-        self._total = sum(self._weights.values())
+    def __init__(self, weights: dict[str, float], before: int) -> None:
+        self._weights = weights
+        self._total = sum(weights.values())
         self._share = 0.0
-        self._count, self._all = before, before + len(tasks)
+        self._count, self._all = before, before + len(weights)
         self._bar = ProgressBar(f"{before} of {self._all} runs") if sys.stderr.isatty() else None
         self._started = time.monotonic()
         if self._bar is not None:
@@ -119,10 +125,11 @@ class _Progress:
         elif before:
             print(f"{before} of {self._all} runs were finished before", file=sys.stderr)
 
-    def done(self, task: Task, outcome: Outcome) -> None:
-        """Take in that ``task`` is over."""
+    def done(self, work: Work, outcome: Outcome) -> None:
+        """Take in that ``work`` is over."""
+        task = work.task
         self._count += 1
-        self._share += self._weights[task] / self._total
+        self._share += self._weights[work.name] / self._total
         if self._bar is not None:
             self._bar.title = f"{self._count} of {self._all} runs, last {task.experiment}"
             self._bar(self._share)

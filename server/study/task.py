@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from robot.calibration import Calibration
 from robot.configuration import Configuration
 from scenes.experiments import experiment
+from server.run.figures import result_document
+from server.run.headless import HeadlessRun
 from server.run.options import RunOptions, cut, options_for
 from server.study.program_mark import program_mark
+from server.study.work import Outcome, finished, packed_trace
 
 _MARK_LENGTH = 12
 
 
 @dataclass(frozen=True)
 class Task:
-    """One run of a study.
+    """One run of the instrument.
 
     Attributes:
         experiment: name of the experiment.
@@ -78,6 +82,31 @@ class Task:
             f"{self.experiment}, case {self.case}, {self.preset}, seed {self.seed}, "
             f"tracker {tracked}, compensation {self.compensation}"
         )
+
+    def weight(self, configuration: Configuration) -> float:
+        """Duration of the path, s."""
+        return self.options(configuration).path.duration_s
+
+    def outcome(
+        self,
+        configuration: Configuration,
+        calibration: Calibration | None,
+        interrupted: Callable[[], bool],
+    ) -> Outcome:
+        """Run it.
+
+        Args:
+            configuration: the study's.
+            calibration: of the robot, or None to calibrate it where it is needed.
+            interrupted: asked every tick whether to stop.
+        """
+        options = self.options(configuration)
+        run = HeadlessRun(configuration, options, calibration)
+        result = run.execute(lambda _: None, interrupted)
+        if result.ended == "interrupted":
+            return Outcome(None)
+        document = result_document(run.configuration, options, result)
+        return finished(document, packed_trace(result, run.dt_s))
 
 
 @dataclass(frozen=True)

@@ -8,21 +8,49 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from robot.calibration import Calibration
 from robot.configuration import Configuration
 from robot.errors import KeyholeError
-from server.run.figures import result_document
-from server.run.headless import HeadlessRun, RunResult
+from server.run.headless import RunResult
 from server.study.program_mark import program_mark
-from server.study.task import Task
 from server.version import version
 
 _TRACE_PERIOD_S = 0.02
 _one_at_a_time = threading.Lock()
+
+
+class StudyTask(Protocol):
+    """One run of a study, of whichever robot; equal ones are the same run."""
+
+    @property
+    def experiment(self) -> str:
+        """Name of the experiment."""
+        ...
+
+    def name(self, configuration: Configuration, calibration: str | None) -> str:
+        """A name for files: the task, and a mark of all else that its result depends on."""
+        ...
+
+    def words(self) -> str:
+        """For people."""
+        ...
+
+    def weight(self, configuration: Configuration) -> float:
+        """How long it takes, beside other tasks of the study."""
+        ...
+
+    def outcome(
+        self,
+        configuration: Configuration,
+        calibration: Calibration | None,
+        interrupted: Callable[[], bool],
+    ) -> Outcome:
+        """Run it; raises :class:`robot.errors.KeyholeError` where it cannot be run."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -37,7 +65,7 @@ class Work:
         program: mark of the Keyhole that asks.
     """
 
-    task: Task
+    task: StudyTask
     name: str
     configuration: str
     calibration: str | None
@@ -71,22 +99,23 @@ def perform(work: Work, interrupted: Callable[[], bool] = lambda: False) -> Outc
     # A cluster's worker may have threads; a run is not made to share a process with another.
     with _one_at_a_time:
         try:
-            return _run(work, interrupted)
+            given = work.calibration
+            return work.task.outcome(
+                Configuration.model_validate_json(work.configuration),
+                None if given is None else Calibration.model_validate_json(given),
+                interrupted,
+            )
         except KeyholeError as error:
             return Outcome(None, failure=" ".join(str(error).split()))
 
 
-def _run(work: Work, interrupted: Callable[[], bool]) -> Outcome:
-    configuration = Configuration.model_validate_json(work.configuration)
-    given = work.calibration
-    calibration = None if given is None else Calibration.model_validate_json(given)
-    options = work.task.options(configuration)
-    run = HeadlessRun(configuration, options, calibration)
-    result = run.execute(lambda _: None, interrupted)
-    if result.ended == "interrupted":
-        return Outcome(None)
-    trace = packed_trace(result, run.dt_s)
-    document = result_document(run.configuration, options, result)
+def finished(document: dict[str, Any], trace: bytes) -> Outcome:
+    """The outcome of a run that was not interrupted.
+
+    Args:
+        document: its figures; what made them, and a mark of the trace, are added.
+        trace: a compressed ``.npz``.
+    """
     document["keyhole"] = version()
     document["trace_sha256"] = hashlib.sha256(trace).hexdigest()
     return Outcome(document, trace)
