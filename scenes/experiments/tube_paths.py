@@ -5,13 +5,12 @@ The paper prints neither; both figures have 100 points of about 1 mm and start a
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 
 import numpy as np
 
-from robot.errors import KeyholeError, UnknownName
+from robot.errors import UnknownName
+from scenes.csv_table import check_range, read_rows
 
 HEADER = ("x_mm", "y_mm", "z_mm")
 POINTS_MAX = 20_000
@@ -20,23 +19,6 @@ NAMES = ("rectangle", "lissajous")
 
 _POINTS = 100
 _CHORDS = 4000
-
-
-class PointFileError(KeyholeError):
-    """A file of points cannot be used.
-
-    Attributes:
-        file: its name.
-        line: line in the file, from 1.
-        column: name of the column, or empty.
-    """
-
-    code = "point_file"
-
-    def __init__(self, file: str, line: int, column: str, detail: str) -> None:
-        place = f"{file}, line {line}" + (f", column {column}" if column else "")
-        super().__init__(f"{place}: {detail}")
-        self.file, self.line, self.column = file, line, column
 
 
 def tube_path(name: str) -> np.ndarray:
@@ -69,20 +51,6 @@ def lissajous() -> np.ndarray:
     return 1e-3 * np.column_stack([x, np.zeros(_POINTS), z])
 
 
-def _offset(file: str, line: int, column: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise PointFileError(
-            file, line, column, f"{text.strip()!r} is not a number; write an offset in mm"
-        ) from None
-    if not abs(value) <= OFFSET_MAX_MM:
-        raise PointFileError(
-            file, line, column, f"{text.strip()} mm is out of range (±{OFFSET_MAX_MM:g} mm)"
-        )
-    return value
-
-
 def parse_points(text: str, name: str) -> np.ndarray:
     """Read offsets from A's first tip position, one point a row.
 
@@ -94,39 +62,10 @@ def parse_points(text: str, name: str) -> np.ndarray:
         Offsets (points, 3), m.
 
     Raises:
-        PointFileError: names file, line and column of the first thing that is wrong.
+        TableError: names file, line and column of the first thing that is wrong.
     """
-    reader = csv.reader(io.StringIO(text.removeprefix("\ufeff")), skipinitialspace=True)
-    rows: list[list[float]] = []
-    header: tuple[str, ...] | None = None
-    try:
-        for fields in reader:
-            line = reader.line_num
-            if not fields or fields[0].lstrip().startswith("#"):
-                continue
-            if header is None:
-                header = tuple(field.strip() for field in fields)
-                if header != HEADER:
-                    raise PointFileError(name, line, "", f"the columns must be {', '.join(HEADER)}")
-                continue
-            if len(fields) != len(HEADER):
-                raise PointFileError(
-                    name, line, "", f"{len(fields)} values where {len(HEADER)} are needed"
-                )
-            if len(rows) == POINTS_MAX:
-                raise PointFileError(
-                    name, line, "", f"more than {POINTS_MAX} points; cut the path in two"
-                )
-            rows.append(
-                [
-                    _offset(name, line, column, field)
-                    for column, field in zip(HEADER, fields, strict=True)
-                ]
-            )
-    except csv.Error as error:
-        raise PointFileError(name, reader.line_num, "", str(error)) from None
-    if not rows:
-        raise PointFileError(
-            name, max(reader.line_num, 1), "", "holds no point; write one offset a row"
-        )
-    return 1e-3 * np.array(rows)
+    rows = read_rows(text, name, HEADER, 1, POINTS_MAX)
+    for line, values in rows:
+        for column, value in zip(HEADER, values, strict=True):
+            check_range(name, line, column, value, OFFSET_MAX_MM)
+    return 1e-3 * np.array([row.values for row in rows])

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robot.concentric.design import Concentric
-from robot.concentric.methods.choice import METHOD_NAMES
+from robot.concentric.design import METHODS, Concentric
 from robot.errors import UnknownName
 from scenes.experiments.tube_paths import parse_points
 from scenes.experiments.tubes import POINTS, RANDOM, TITLES, TRADE_OFF, TubeMotion, motions, starts
@@ -47,7 +46,7 @@ def add_tube_arguments(parser: argparse.ArgumentParser) -> None:
         "--robot", choices=("instrument", "concentric"), help="whose path --path FILE is"
     )
     parser.add_argument(
-        "--method", choices=(*METHOD_NAMES, ALL), help="how tubes resolve the redundancy"
+        "--method", choices=(*METHODS, ALL), help="how tubes resolve the redundancy"
     )
     parser.add_argument(
         "--configuration", metavar="N", help=f"where the tubes start: 1, 2, 3 ... or {ALL}"
@@ -189,7 +188,7 @@ def _sweep(arguments: argparse.Namespace, design: Concentric) -> _Sweep:
 
 def _methods(wanted: str | None, name: str, design: Concentric) -> tuple[str, ...]:
     if wanted == ALL or (wanted is None and name == TRADE_OFF):
-        return METHOD_NAMES
+        return METHODS
     return (wanted or design.method,)
 
 

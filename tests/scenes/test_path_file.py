@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenes.path_file import HEADER, ROWS_MAX, PathFileError, parse_csv
+from scenes.csv_table import TableError
+from scenes.path_file import HEADER, ROWS_MAX, parse_csv
 
 HEAD = "time_s, x_mm, y_mm, z_mm, qw, qx, qy, qz\n"
 GOOD = "0,0,0,0,1,0,0,0\n"
 
 
-def refused(text: str) -> PathFileError:
-    with pytest.raises(PathFileError) as caught:
+def refused(text: str) -> TableError:
+    with pytest.raises(TableError) as caught:
         parse_csv(text, "paths/mine.csv")
     error = caught.value
     assert error.file == "paths/mine.csv"
@@ -108,7 +109,7 @@ def test_a_zero_quaternion_is_named(quaternion: str) -> None:
 
 @pytest.mark.parametrize("text", ["", "\n", HEAD, HEAD + GOOD, "# nothing\n"])
 def test_less_than_two_rows_are_no_path(text: str) -> None:
-    assert "two rows" in str(refused(text))
+    assert "rows where 2 or more are needed" in str(refused(text))
 
 
 def test_lines_are_counted_as_an_editor_does() -> None:

@@ -8,10 +8,10 @@ import pytest
 from robot.concentric.pair import ArmPair, PairKinematics
 from robot.concentric.proximal import Proximal
 from robot.errors import UnknownName
+from scenes.csv_table import TableError
 from scenes.experiments.tube_paths import (
     NAMES,
     POINTS_MAX,
-    PointFileError,
     lissajous,
     parse_points,
     rectangle,
@@ -74,19 +74,19 @@ def test_points_are_read_in_millimetres() -> None:
     [
         ("x,y,z\n1,2,3\n", 1, "", "the columns must be x_mm, y_mm, z_mm"),
         (HEAD + "1,2\n", 2, "", "2 values where 3 are needed"),
-        (HEAD + "1,2,3\n1,two,3\n", 3, "y_mm", "'two' is not a number; write an offset in mm"),
-        (HEAD + "1,2,nan\n", 2, "z_mm", "nan mm is out of range"),
-        (HEAD + "inf,2,3\n", 2, "x_mm", "inf mm is out of range"),
+        (HEAD + "1,2,3\n1,two,3\n", 3, "y_mm", "'two' is not a number"),
+        (HEAD + "1,2,nan\n", 2, "z_mm", "nan is not a finite number"),
+        (HEAD + "inf,2,3\n", 2, "x_mm", "inf is not a finite number"),
         (HEAD + "1,2,3000\n", 2, "z_mm", "3000 mm is out of range (±1000 mm)"),
-        (HEAD, 1, "", "holds no point; write one offset a row"),
-        ("", 1, "", "holds no point"),
-        (HEAD + "1,2,3\n" * (POINTS_MAX + 1), POINTS_MAX + 2, "", "cut the path in two"),
+        (HEAD, 1, "", "0 rows where 1 or more are needed"),
+        ("", 1, "", "0 rows where 1"),
+        (HEAD + "1,2,3\n" * (POINTS_MAX + 1), POINTS_MAX + 2, "", "cut the file in two"),
     ],
 )
 def test_a_file_that_is_wrong_is_refused_where_it_is(
     text: str, line: int, column: str, words: str
 ) -> None:
-    with pytest.raises(PointFileError) as refusal:
+    with pytest.raises(TableError) as refusal:
         parse_points(text, "points.csv")
     error = refusal.value
     assert (error.file, error.line, error.column) == ("points.csv", line, column)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robot.concentric.methods.choice import METHOD_NAMES
+from robot.concentric.design import METHODS
 from robot.concentric.pair import start_of
 from scenes.experiments.tube_paths import tube_path
 from scenes.experiments.tube_starts import random_starts
@@ -105,10 +105,10 @@ def test_hqp_keeps_b_beside_a_in_every_iteration(path: str) -> None:
 
 def test_hqp_does_so_from_random_configurations() -> None:
     """The whole of it, 20 starts and 100 points, is ``keyhole run random --method all``."""
-    design, reached = load(None).concentric, dict.fromkeys(METHOD_NAMES, 0)
+    design, reached = load(None).concentric, dict.fromkeys(METHODS, 0)
     for number, start in enumerate(random_starts(design, 3, 7)):
         task = TubeTask("random", str(number), start, tube_path("lissajous")[::4][:12])
-        for method in METHOD_NAMES:
+        for method in METHODS:
             run = TubeRun(design, task, method)
             document = tube_document(task, method, run.execute(lambda _: None, lambda: False))
             reached[method] += document["converged_points"]
@@ -162,7 +162,7 @@ def test_all_methods_from_all_configurations_make_a_list_with_means(
     options = ["--method", "all", "--configuration", "all", "--json", "-"]
     assert main(["run", "points", "--path", short, *options]) == 0
     document = json.loads(capsys.readouterr().out)
-    assert [run["method"] for run in document["runs"]] == list(METHOD_NAMES)
+    assert [run["method"] for run in document["runs"]] == list(METHODS)
     for run in document["runs"]:
         assert not set(EVERY_KEY) - set(run)
         own = run["configurations"]
@@ -187,7 +187,7 @@ def test_random_starts_are_counted_and_seeded(capsys: pytest.CaptureFixture[str]
 def test_a_run_told_to_people_is_a_table(short: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "points", "--path", short, "--method", "all"]) == 0
     told = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in told] == ["method", *METHOD_NAMES]
+    assert [line.split()[0] for line in told] == ["method", *METHODS]
     assert "3/3" in told[1]
 
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, get_args
+from typing import Protocol
 
-from robot.concentric.design import MethodName
+from robot.concentric.design import METHODS
 from robot.concentric.methods.hqp import Hqp
 from robot.concentric.methods.nspqp import Nspqp
 from robot.concentric.methods.nspwln import PrintedNspwln, RepairedNspwln
 from robot.concentric.methods.rate_problem import RateProblem, Solution
 from robot.concentric.methods.snsqp import Snsqp
 from robot.errors import UnknownName
-
-METHOD_NAMES: tuple[MethodName, ...] = get_args(MethodName)
 
 
 class Method(Protocol):
@@ -47,5 +45,5 @@ _MAKERS: dict[str, Callable[[RateProblem], Method]] = {
 def method_named(name: str, problem: RateProblem) -> Method:
     """The method called ``name``, for problems of this size; raises ``UnknownName``."""
     if name not in _MAKERS:
-        raise UnknownName("method", name, METHOD_NAMES)
+        raise UnknownName("method", name, METHODS)
     return _MAKERS[name](problem)

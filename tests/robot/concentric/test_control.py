@@ -13,8 +13,7 @@ from robot.concentric.control import (
     ControlStatus,
     PairControl,
 )
-from robot.concentric.design import Concentric
-from robot.concentric.methods.choice import METHOD_NAMES
+from robot.concentric.design import METHODS, Concentric
 from robot.concentric.pair import PairKinematics
 from robot.concentric.proximal import Proximal
 from tests.robot.concentric.pair_problem import TUBES, at, configurations, control, design
@@ -91,7 +90,7 @@ def test_hqp_against_the_limits_never_leaves_them(rng: np.random.Generator) -> N
     assert held > 30
 
 
-@pytest.mark.parametrize("method", METHOD_NAMES)
+@pytest.mark.parametrize("method", METHODS)
 def test_a_replay_is_the_same_bit_for_bit(method: str) -> None:
     ends = []
     for _ in range(2):
@@ -102,7 +101,7 @@ def test_a_replay_is_the_same_bit_for_bit(method: str) -> None:
     assert ends[0] == ends[1]
 
 
-@pytest.mark.parametrize("method", METHOD_NAMES)
+@pytest.mark.parametrize("method", METHODS)
 def test_one_step_follows_from_configuration_and_torsion_alone(method: str) -> None:
     """What came before leaves nothing behind: a replay may begin anywhere."""
     drive, fresh = Drive(method, configurations()[5]), Drive(method, configurations()[5])
@@ -116,7 +115,7 @@ def test_one_step_follows_from_configuration_and_torsion_alone(method: str) -> N
     assert fresh.bits() == drive.bits()
 
 
-@pytest.mark.parametrize("method", METHOD_NAMES)
+@pytest.mark.parametrize("method", METHODS)
 def test_nothing_moves_where_nothing_is_wanted(method: str) -> None:
     for q in configurations()[:3]:
         drive = Drive(method, q)
@@ -124,7 +123,7 @@ def test_nothing_moves_where_nothing_is_wanted(method: str) -> None:
         np.testing.assert_allclose(drive.now.q, q, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("method", METHOD_NAMES)
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_a_number_that_is_not_finite_moves_nothing(method: str, bad: float) -> None:
     drive = Drive(method, configurations()[0])

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear, nnls
 
-from robot.concentric.methods.choice import METHOD_NAMES, method_named
+from robot.concentric.design import METHODS
+from robot.concentric.methods.choice import method_named
 from robot.concentric.methods.nspqp import REGULARISATION as NSPQP_REGULARISATION
 from robot.concentric.methods.nspwln import (
     TRACKING_WEIGHT,
@@ -48,7 +49,7 @@ def touched(rates: np.ndarray, problem: RateProblem) -> np.ndarray:
 
 def test_every_method_has_its_name() -> None:
     problem = rate_problem(configurations()[0], np.random.default_rng(0))
-    for name in METHOD_NAMES:
+    for name in METHODS:
         assert method_named(name, problem).name == name
     with pytest.raises(UnknownName, match="nspqp, snsqp, hqp"):
         method_named("dls", problem)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from robot.concentric.control import ControlReport, ControlStatus, PairControl
-from robot.concentric.design import Concentric
+from robot.concentric.design import METHODS, Concentric
 from robot.concentric.kinematics import SOLVED
-from robot.concentric.methods.choice import METHOD_NAMES
 from robot.concentric.pair import PairKinematics
 from robot.concentric.proximal import Proximal
 from tests.robot.concentric.arm_solution import DESIGNS
@@ -31,7 +30,7 @@ def standing(control: PairControl, count: int, rng: np.random.Generator) -> Pair
     return found
 
 
-@pytest.mark.parametrize("method", METHOD_NAMES)
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("count", [2, 4])
 def test_a_follows_and_b_keeps_its_place(count: int, method: str, rng: np.random.Generator) -> None:
     control = PairControl(with_tubes(count), 0.1, method)
