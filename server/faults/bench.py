@@ -22,7 +22,7 @@ from robot.records import Readiness, Safety
 from robot.safety import REASONS, Event
 from server.faults.access import Answer, Api
 from server.faults.clock import SettableClock
-from server.faults.fault import BenchFailed, Deadline
+from server.faults.demands import BenchFailed, Deadline
 from server.faults.leading import Circle, StreamLeader
 from server.faults.stylus import StylusProcess
 from server.faults.watching import Records, Watch, commanded_path_mm, reason, safety

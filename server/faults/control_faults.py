@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from robot.records import Refusal, Safety
 from robot.safety import REASONS, Event
 from server.faults.bench import Bench
-from server.faults.fault import Deadline, Fault, Finding, Group
+from server.faults.demands import Deadline
+from server.faults.fault import Fault, Finding, Group
 from server.faults.stopping import LOOK_S, NOTICE_S, afterwards, describe, recovered, stamp, stopped
 from server.faults.watching import (
     Records,

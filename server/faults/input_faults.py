@@ -12,7 +12,8 @@ import numpy as np
 from robot.records import Safety
 from robot.safety import Event
 from server.faults.bench import Bench
-from server.faults.fault import Deadline, Fault, Finding, Group
+from server.faults.demands import Deadline
+from server.faults.fault import Fault, Finding, Group
 from server.faults.leading import Sample, Tamper
 from server.faults.stopping import LOOK_S, stopped
 from server.faults.watching import safety

@@ -8,7 +8,8 @@ import numpy as np
 
 from robot.records import Safety
 from server.faults.bench import Bench
-from server.faults.fault import BenchFailed, Deadline, Fault, Finding, Group
+from server.faults.demands import BenchFailed, Deadline
+from server.faults.fault import Fault, Finding, Group
 from server.faults.stopping import NOTICE_S
 from server.faults.watching import Records, safety
 

@@ -14,7 +14,7 @@ from typing import Self
 from hardware.fake_servos.client import FakeServos, FakeServosFailed
 from hardware.fake_servos.program import control_path
 from scenes.path_file import HEADER
-from server.faults.fault import BenchFailed
+from server.faults.demands import BenchFailed
 from server.supervision.child_process import module_command, module_environment
 
 _RADIUS_MM, _TURN_S, _ROWS = 8.0, 2.5, 50

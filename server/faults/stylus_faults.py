@@ -11,7 +11,8 @@ from hardware.fake_servos.client import FakeServos
 from robot.records import Safety
 from robot.safety import Event
 from server.faults.bench import Bench
-from server.faults.fault import BenchFailed, Deadline, Fault, Finding, Group
+from server.faults.demands import BenchFailed, Deadline
+from server.faults.fault import Fault, Finding, Group
 from server.faults.stopping import LOOK_S, stopped
 from server.faults.watching import safety
 

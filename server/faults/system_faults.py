@@ -14,7 +14,8 @@ from robot.records import Safety
 from robot.safety import Event
 from server.faults.access import Api
 from server.faults.bench import Bench
-from server.faults.fault import Deadline, Fault, Finding, Group
+from server.faults.demands import Deadline
+from server.faults.fault import Fault, Finding, Group
 from server.faults.stopping import LOOK_S, NOTICE_S, recovered, stopped
 from server.faults.watching import commanded_path_mm, reach_mm, safety, stands_still
 
