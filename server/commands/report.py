@@ -1,26 +1,38 @@
-"""``keyhole report``: all of the paper's experiments, and one page about them."""
+"""``keyhole report``: all of both papers' experiments, and one page about them."""
 
 from __future__ import annotations
 
 import argparse
 import sys
+import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from robot.configuration import Configuration
 from scenes.experiments import experiment
+from server.commands.progress_bar import clock
+from server.commands.run_refusals import refuse_options
 from server.commands.stop_signals import StopSignals
 from server.commands.study import add_worker_arguments, calibration_text, seeds
 from server.configuration_file import load
 from server.report.results import Results, tasks
+from server.report.tube_measures import measure_tubes
+from server.report.tube_results import TubeResults
+from server.report.tube_tasks import tube_csv, tube_tasks
 from server.run.headless import HeadlessRun
 from server.run.options import PLANTS, PRESETS, cut, options_for
 from server.study.folder import StudyFolder
 from server.study.local_workers import default_jobs
 from server.study.program_mark import program_mark
-from server.study.study import Study, StudyResult
+from server.study.study import AnyTask, Study, StudyResult
+from server.study.task import Task
 from server.version import version
 
 PAGE = "report.html"
+ROBOTS = ("instrument", "concentric")
+_TUBES = "tubes"
+_PRESET = "paper"
+_INSTRUMENT_OPTIONS = ("seeds", "preset", "plant", "calibration")
 _SEEDS = [1, 2, 3, 4, 5]
 _QUICK_S = 2.0
 _SPEED_S = 5.0
@@ -28,11 +40,12 @@ _SPEED_S = 5.0
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``report`` to the command line."""
-    parser = subparsers.add_parser("report", help="run the paper's experiments, write one page")
+    parser = subparsers.add_parser("report", help="run the papers' experiments, write one page")
     parser.add_argument("--out", metavar="DIR", required=True, help=f"folder of runs and {PAGE}")
-    parser.add_argument("--seeds", metavar="LIST", type=seeds, help="seeds (1-5)")
-    parser.add_argument("--preset", choices=PRESETS, default="paper", help="simulated robot")
-    parser.add_argument("--plant", choices=PLANTS, default="physics", help="the robot")
+    parser.add_argument("--robot", choices=ROBOTS, help="the part of one robot only")
+    parser.add_argument("--seeds", metavar="LIST", type=seeds, help="of the instrument (1-5)")
+    parser.add_argument("--preset", choices=PRESETS, help="how good the instrument is (paper)")
+    parser.add_argument("--plant", choices=PLANTS, help="how the instrument is simulated (physics)")
     parser.add_argument(
         "--quick", action="store_true", help="one seed, the first seconds of each path only"
     )
@@ -46,31 +59,95 @@ def execute(arguments: argparse.Namespace) -> int:
     Returns:
         0 when the page holds every run, 1 when it was stopped or a run could not be made.
     """
+    if arguments.robot == "concentric":
+        refuse_options(
+            arguments, _INSTRUMENT_OPTIONS, "the concentric-tube arms have no such thing"
+        )
     configuration = load(arguments.config)
-    chosen = arguments.seeds or (_SEEDS[:1] if arguments.quick else _SEEDS)
-    seconds = _QUICK_S if arguments.quick else None
     folder = StudyFolder(Path(arguments.out))
-    wanted = tasks(arguments.plant, arguments.preset, chosen, seconds)
+    chosen = arguments.seeds or (_SEEDS[:1] if arguments.quick else _SEEDS)
+    instrument = tubes = None
+    factor = None
+    with StopSignals() as stopped:
+        if arguments.robot != "concentric":
+            instrument = _run_instrument(arguments, configuration, folder, chosen, stopped.received)
+            if instrument.stopped:
+                return _stopped(instrument)
+            factor = _speed(configuration, arguments)
+        if arguments.robot != "instrument":
+            tubes = _run_tubes(arguments, configuration, folder, stopped.received)
+            if tubes.study.stopped:
+                return _stopped(tubes.study)
+    failures = _failures(instrument) + _failures(None if tubes is None else tubes.study)
+    _write(arguments, configuration, folder, chosen, factor, failures, instrument, tubes)
+    print(folder.path / PAGE)
+    for failure in failures:
+        print(f"keyhole: {failure}", file=sys.stderr)
+    return 1 if failures else 0
+
+
+def _stopped(result: StudyResult[AnyTask]) -> int:
+    count = len(result.documents)
+    print(f"stopped: {count} of {len(result.names)} runs are finished; no page is written")
+    return 1
+
+
+def _failures(result: StudyResult[AnyTask] | None) -> list[str]:
+    failures: Mapping[AnyTask, str] = {} if result is None else result.failures
+    return [f"{task.words()}: {failure}" for task, failure in failures.items()]
+
+
+def _run_instrument(
+    arguments: argparse.Namespace,
+    configuration: Configuration,
+    folder: StudyFolder,
+    chosen: list[int],
+    stopped: Callable[[], bool],
+) -> StudyResult[Task]:
+    seconds = _QUICK_S if arguments.quick else None
     study = Study(
-        wanted,
+        tasks(_plant(arguments), _preset(arguments), chosen, seconds),
         configuration,
         calibration_text(arguments.calibration),
         folder,
         arguments.jobs or default_jobs(),
         arguments.scheduler,
     )
-    with StopSignals() as stopped:
-        result = study.run(stopped.received)
-        if result.stopped:
-            count = len(result.documents)
-            print(f"stopped: {count} of {len(wanted)} runs are finished; no page is written")
-            return 1
-        factor = _speed(configuration, arguments)
-    _write(arguments, configuration, result, folder, chosen, seconds, factor)
-    print(folder.path / PAGE)
-    for task, failure in result.failures.items():
-        print(f"keyhole: {task.words()}: {failure}", file=sys.stderr)
-    return 1 if result.failures else 0
+    return study.run(stopped)
+
+
+def _run_tubes(
+    arguments: argparse.Namespace,
+    configuration: Configuration,
+    folder: StudyFolder,
+    stopped: Callable[[], bool],
+) -> TubeResults:
+    began = time.monotonic()
+    own = StudyFolder(folder.path / _TUBES)
+    study = Study(
+        tube_tasks(configuration, arguments.quick),
+        configuration,
+        None,
+        own,
+        arguments.jobs or default_jobs(),
+        arguments.scheduler,
+        tube_csv,
+    )
+    result = study.run(stopped)
+    measures = None
+    if not result.stopped:
+        measures = measure_tubes(configuration.concentric, arguments.quick)
+    took = time.monotonic() - began
+    print(f"concentric tubes took {clock(took)}", file=sys.stderr)
+    return TubeResults(result, own, measures, took)
+
+
+def _plant(arguments: argparse.Namespace) -> str:
+    return str(arguments.plant or PLANTS[0])
+
+
+def _preset(arguments: argparse.Namespace) -> str:
+    return str(arguments.preset or _PRESET)
 
 
 def _speed(configuration: Configuration, arguments: argparse.Namespace) -> float:
@@ -80,8 +157,8 @@ def _speed(configuration: Configuration, arguments: argparse.Namespace) -> float
         found,
         configuration,
         "0",
-        plant=arguments.plant,
-        preset=arguments.preset,
+        plant=_plant(arguments),
+        preset=_preset(arguments),
         compensation="off",
         path=cut(found.path, _QUICK_S if arguments.quick else _SPEED_S),
     )
@@ -92,27 +169,33 @@ def _speed(configuration: Configuration, arguments: argparse.Namespace) -> float
 def _write(
     arguments: argparse.Namespace,
     configuration: Configuration,
-    result: StudyResult,
     folder: StudyFolder,
     chosen: list[int],
-    seconds: float | None,
-    factor: float,
+    factor: float | None,
+    failures: list[str],
+    instrument: StudyResult[Task] | None,
+    tubes: TubeResults | None,
 ) -> None:
     # The drawing library takes a second to load; a refusal need not wait for it.
     from server.report.page import Conditions, page
 
-    command = f"keyhole report --out DIR --preset {arguments.preset} --plant {arguments.plant}"
-    command += f" --seeds {','.join(map(str, chosen))}" + " --quick" * arguments.quick
+    plant, preset = _plant(arguments), _preset(arguments)
+    command = "keyhole report --out DIR"
+    if arguments.robot is not None:
+        command += f" --robot {arguments.robot}"
+    if instrument is not None:
+        command += f" --preset {preset} --plant {plant} --seeds {','.join(map(str, chosen))}"
+    command += " --quick" * arguments.quick
     conditions = Conditions(
-        arguments.plant,
-        arguments.preset,
+        plant,
+        preset,
         chosen,
-        seconds,
+        _QUICK_S if arguments.quick else None,
         factor,
         version(),
         program_mark()[:16],
         command,
-        [f"{task.words()}: {failure}" for task, failure in result.failures.items()],
+        failures,
     )
-    text = page(Results(result, folder), configuration, conditions)
-    folder.write(PAGE, text.encode())
+    results = None if instrument is None else Results(instrument, folder)
+    folder.write(PAGE, page(results, configuration, conditions, tubes).encode())

@@ -10,13 +10,18 @@ from importlib import resources
 from hardware.physics.preset import PRESETS
 from robot.configuration import Configuration
 from server.report import markup
-from server.report.claims import Claim, claims
+from server.report.claims import claims
 from server.report.experiment_plots import lambda_plot, residual_plot
 from server.report.experiment_sections import PARTS, experiments
 from server.report.markup import Cell
 from server.report.measures import PAPER_TABLE_5, DexterityRow, Table5, table_5
 from server.report.results import Results
 from server.report.targets import Verdict, verdicts
+from server.report.tube_results import TubeResults
+from server.report.tube_sections import LINKS, tube_sections
+from server.report.tube_tasks import RANDOM_SEED
+from server.report.verdict_tables import claims_section, verdict_cell
+from server.run.tube_run import PERIOD_S
 
 REALTIME_AT_LEAST = 2.0
 _CIRCLES = ("circle", "circle-infeasible")
@@ -61,20 +66,26 @@ class Conditions:
     failures: Sequence[str] = ()
 
 
-def page(results: Results, configuration: Configuration, conditions: Conditions) -> str:
-    """The whole page as HTML; it refers to nothing outside itself."""
-    table = table_5(results, configuration)
-    found = claims(results, table)
-    parts = [
-        _head(conditions),
-        _targets(verdicts(results, conditions.seconds is None), conditions),
-        _fit(conditions),
-        _claims(found),
-        experiments(results, configuration),
-        _twists(results, configuration),
-        _dexterity(table) if table is not None else "",
-        _made(configuration, conditions),
-    ]
+def page(
+    results: Results | None,
+    configuration: Configuration,
+    conditions: Conditions,
+    tubes: TubeResults | None = None,
+) -> str:
+    """The whole page as HTML; it refers to nothing outside itself.
+
+    Args:
+        results: runs of the instrument; None without its part.
+        configuration: what they were made under.
+        conditions: the rest of it.
+        tubes: runs of the concentric-tube arms; None without their part.
+    """
+    parts = [_head(conditions, results is not None, tubes is not None)]
+    if results is not None:
+        parts.append(_instrument(results, configuration, conditions))
+    if tubes is not None:
+        parts.append(tube_sections(tubes, configuration))
+    parts.append(_made(configuration, conditions, results is not None, tubes))
     style = "".join(
         (resources.files(package) / name).read_text(encoding="utf-8")
         for package, name in (
@@ -86,42 +97,81 @@ def page(results: Results, configuration: Configuration, conditions: Conditions)
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         '<meta name="color-scheme" content="light dark">'
-        f"<title>Keyhole: the paper’s experiments, {markup.text(conditions.preset)} preset</title>"
+        f"<title>Keyhole: {_title(conditions, results is not None, tubes is not None)}</title>"
         f"<style>{style}</style></head><body><main>{''.join(parts)}</main></body></html>\n"
     )
 
 
-def _head(conditions: Conditions) -> str:
+def _instrument(results: Results, configuration: Configuration, conditions: Conditions) -> str:
+    """All sections of the instrument."""
+    table = table_5(results, configuration)
+    return "".join(
+        (
+            _targets(verdicts(results, conditions.seconds is None), conditions),
+            _fit(conditions),
+            claims_section(
+                "claims",
+                "The paper’s claims",
+                claims(results, table),
+                "Each is decided by the rule beside it, on medians over the seeds. A claim that "
+                "fails on this robot may hold on another; one that holds may owe it to the fit.",
+            ),
+            experiments(results, configuration),
+            _twists(results, configuration),
+            _dexterity(table) if table is not None else "",
+        )
+    )
+
+
+def _title(conditions: Conditions, instrument: bool, tubes: bool) -> str:
+    parts = []
+    if instrument:
+        parts.append(f"the paper’s experiments, {markup.text(conditions.preset)} preset")
+    if tubes:
+        parts.append("concentric tubes")
+    return "; ".join(parts)
+
+
+def _head(conditions: Conditions, instrument: bool, tubes: bool) -> str:
     seeds = ", ".join(map(str, conditions.seeds))
+    words = f"Keyhole {conditions.version}"
+    if instrument:
+        words += (
+            f", {conditions.plant} plant, preset {conditions.preset}, seeds {seeds}. Errors are "
+            "desired minus true"
+        )
+    title = "The paper’s experiments on a simulated robot"
+    if tubes:
+        title = "Two papers’ experiments on simulated robots" if instrument else "Concentric tubes"
     parts = [
-        "<header><h1>The paper’s experiments on a simulated robot</h1>",
-        markup.paragraph(
-            f"Keyhole {conditions.version}, {conditions.plant} plant, preset {conditions.preset}, "
-            f"seeds {seeds}. Errors are desired minus true. Research software, not a medical "
-            "device."
-        ),
+        f"<header><h1>{title}</h1>",
+        markup.paragraph(f"{words}. Research software, not a medical device."),
     ]
     notes = []
-    if conditions.seconds is not None:
+    if instrument and conditions.seconds is not None:
         notes.append(
             f"Only the first {conditions.seconds:g} s of each path were played: the figures show "
             "that the report works, and no target counts as met."
         )
-    if conditions.plant == "kinematic":
+    if instrument and conditions.plant == "kinematic":
         notes.append("The kinematic plant is exact: errors are numerical noise, nothing touches.")
     notes += [f"Not run: {failure}" for failure in conditions.failures]
-    parts += [markup.paragraph(words, "note") for words in notes]
-    links = [("targets", "Targets"), ("fit", "Fit or measured"), ("claims", "Claims")]
-    links += [(f"experiment-{part.experiment}", part.experiment) for part in PARTS]
-    links += [("twists", "Twists and λ"), ("dexterity", "Table 5"), ("made", "How it was made")]
-    anchors = "".join(f'<a href="#{anchor}">{markup.text(name)}</a>' for anchor, name in links)
-    return "".join(parts) + f"<nav>{anchors}</nav></header>"
+    parts += [markup.paragraph(one, "note") for one in notes]
+    if instrument:
+        links = [("targets", "Targets"), ("fit", "Fit or measured"), ("claims", "Claims")]
+        links += [(f"experiment-{part.experiment}", part.experiment) for part in PARTS]
+        links += [("twists", "Twists and λ"), ("dexterity", "Table 5")]
+        parts.append(_nav("Instrument", links))
+    if tubes:
+        parts.append(_nav("Concentric tubes", LINKS))
+    parts.append(_nav("Both" if instrument and tubes else "", [("made", "How it was made")]))
+    return "".join(parts) + "</header>"
 
 
-def _verdict(met: bool | None, yes: str, no: str) -> Cell:
-    if met is None:
-        return Cell("–", "verdict open")
-    return Cell(f"✓ {yes}" if met else f"✗ {no}", "verdict yes" if met else "verdict no")
+def _nav(name: str, links: Sequence[tuple[str, str]]) -> str:
+    before = f"<strong>{name}</strong>" if name else ""
+    anchors = "".join(f'<a href="#{anchor}">{markup.text(words)}</a>' for anchor, words in links)
+    return f"<nav>{before}{anchors}</nav>"
 
 
 def _targets(found: Sequence[Verdict], conditions: Conditions) -> str:
@@ -140,7 +190,7 @@ def _targets(found: Sequence[Verdict], conditions: Conditions) -> str:
             Cell(bound.allowed(), "number"),
             Cell(ours, "number"),
             Cell("–" if verdict.seed is None else str(verdict.seed), "number"),
-            _verdict(None if verdict.worst is None else verdict.met, "met", "not met"),
+            verdict_cell(None if verdict.worst is None else verdict.met, "met", "not met"),
             verdict.remark,
         ]
         rows.append(row)
@@ -154,7 +204,7 @@ def _targets(found: Sequence[Verdict], conditions: Conditions) -> str:
             Cell(f"≥ {REALTIME_AT_LEAST:g}", "number"),
             Cell(markup.number(factor), "number"),
             Cell("–", "number"),
-            _verdict(fast, "met", "not met"),
+            verdict_cell(fast, "met", "not met"),
             "controller and plant together",
         ]
     )
@@ -193,25 +243,6 @@ def _written(value: object) -> str:
     if isinstance(value, tuple):
         return ", ".join(_written(one) for one in value)
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _claims(found: Sequence[Claim]) -> str:
-    rows: list[list[Cell | str]] = [
-        [claim.source, claim.words, claim.found, _verdict(claim.holds, "holds", "does not hold"),
-         Cell(claim.rule, "small")]
-        for claim in found
-    ]  # fmt: skip
-    fails = sum(claim.holds is False for claim in found)
-    return markup.section(
-        "claims",
-        "The paper’s claims",
-        markup.paragraph(
-            f"{fails} of {len(found)} do not hold here. Each is decided by the rule beside it, on "
-            "medians over the seeds. A claim that fails on this robot may hold on another; one "
-            "that holds may owe it to the fit."
-        ),
-        markup.card(markup.table(("where", "claim", "found", "verdict", "rule"), rows)),
-    )
 
 
 def _twists(results: Results, configuration: Configuration) -> str:
@@ -270,24 +301,44 @@ def _values(row: DexterityRow) -> tuple[float, ...]:
     return row.inverse_linear, row.inverse_angular, row.linear, row.angular
 
 
-def _made(configuration: Configuration, conditions: Conditions) -> str:
+def _made(
+    configuration: Configuration,
+    conditions: Conditions,
+    instrument: bool,
+    tubes: TubeResults | None,
+) -> str:
     rows = [
         ["Keyhole", conditions.version],
         ["program", conditions.program],
         ["configuration", f"{configuration.hash64():016x}"],
-        ["plant, preset", f"{conditions.plant}, {conditions.preset}"],
-        ["seeds", ", ".join(map(str, conditions.seeds))],
-        ["controller", f"{configuration.priority.solver}, {configuration.control.rate_hz:g} Hz"],
-        ["tracker, where it is on", _tracker(configuration)],
-        ["again", conditions.command],
     ]
+    if instrument:
+        rows += [
+            ["plant, preset", f"{conditions.plant}, {conditions.preset}"],
+            ["seeds", ", ".join(map(str, conditions.seeds))],
+            [
+                "controller",
+                f"{configuration.priority.solver}, {configuration.control.rate_hz:g} Hz",
+            ],
+            ["tracker, where it is on", _tracker(configuration)],
+        ]
+    if tubes is not None:
+        rows += [
+            [
+                "concentric tubes",
+                f"random configurations with seed {RANDOM_SEED}; T = {PERIOD_S:g} s",
+            ],
+            ["their runs and measurements took", f"{tubes.seconds:.0f} s, without what was kept"],
+        ]
+    rows.append(["again", conditions.command])
     return markup.section(
         "made",
         "How it was made",
         markup.card(markup.table(("", ""), rows)),
         markup.paragraph(
             "The runs stand beside this page: figures as JSON, traces as .npz (a row every 20 ms), "
-            "all figures in table.csv.",
+            "all figures in table.csv. Those of the concentric tubes stand in tubes/, their traces "
+            "with a row every inner iteration.",
             "small",
         ),
     )

@@ -23,6 +23,12 @@ COLOURS = {
     "case-0": "#010107",
     "case-1": "#010108",
     "case-2": "#010109",
+    **{f"tube-{number}": f"#01011{number}" for number in range(1, 7)},
+    "method-nspwln": "#010121",
+    "method-nspwln-repaired": "#010122",
+    "method-nspqp": "#010123",
+    "method-snsqp": "#010124",
+    "method-hqp": "#010125",
 }
 """Stand-ins for the page's colours: matplotlib knows no CSS variables, the page fills them in."""
 

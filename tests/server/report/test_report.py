@@ -11,12 +11,14 @@ import pytest
 from server.command_line import main
 from server.report.results import SETTINGS, Results, tasks
 from server.report.targets import TARGETS
+from server.report.tube_results import TubeResults
+from server.report.tube_tasks import TubeWork
 from server.study.folder import StudyFolder
 from server.study.study import StudyResult
 from server.study.task import Task
 from tests.server import headless
 
-COMMAND = ["report", "--plant", "kinematic", "--quick"]
+COMMAND = ["report", "--robot", "instrument", "--plant", "kinematic", "--quick"]
 VOID = {"meta", "br", "link", "img", "input", "hr"}
 
 
@@ -132,6 +134,21 @@ def test_a_missing_run_leaves_a_gap_and_no_verdict(folder: Path) -> None:
     assert "met" in words
     assert "✓" not in words
     assert "&lt;all&gt;" in text
+
+
+def test_both_robots_stand_on_one_page(folder: Path) -> None:
+    from server.report.page import Conditions, page
+
+    instrument: StudyResult[Task] = StudyResult({})
+    tubes: StudyResult[TubeWork] = StudyResult({})
+    own = StudyFolder(folder)
+    conditions = Conditions("physics", "paper", [1], None, None, "0", "mark", "again")
+    results, others = Results(instrument, own), TubeResults(tubes, own)
+    found = Page(page(results, headless.configuration(), conditions, others))
+    ids = [attributes["id"] for tag, attributes in found.elements if tag == "section"]
+    assert ids[0] == "targets"
+    assert ids.index("claims") < ids.index("tubes-targets")
+    assert ids[-1] == "made"
 
 
 def test_every_setting_is_run_with_every_seed() -> None:
