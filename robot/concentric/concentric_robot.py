@@ -27,6 +27,10 @@ from robot.teleoperation import follow, release
 
 ARMS = ("A", "B")
 
+_LARGEST_SURPRISE = 0.1
+"""How far the torsion may be from where its derivative says after a tick, rad/m: beyond that it is
+that of another equilibrium, to which the tubes would have to snap."""
+
 
 @compiled
 def _wake(outcome: np.ndarray) -> None:
@@ -82,7 +86,7 @@ class ConcentricRobot:
         tubes = self.pair.count
         self._now, self._after = PairKinematics(tubes), PairKinematics(tubes)
         self._report = ControlReport(tubes)
-        self._feed_forward = np.zeros(3)
+        self._feed_forward, self._guess = np.zeros(3), np.zeros(2 * tubes)
         self._least, self._largest = np.zeros(tubes), np.zeros(tubes)
         self._start = self._started()
 
@@ -162,9 +166,13 @@ class ConcentricRobot:
             self._now, desired, state["relative_position"], self._feed_forward,
             self._after, self._report,
         )  # fmt: skip
-        if status in (ControlStatus.NOT_CONVERGED, ControlStatus.NOT_FINITE):
+        if status == ControlStatus.SOLVED and self._snaps():
+            self._report = ControlReport(self.pair.count)
+            status = self._report.status = ControlStatus.UNSTABLE
+        if status == ControlStatus.NOT_FINITE:
             apply_event(outcome, int(Event.SOLVER_FAILED))
-        elif status == ControlStatus.UNSTABLE:
+        elif status in (ControlStatus.UNSTABLE, ControlStatus.NOT_CONVERGED):
+            # Where the branch ends there is no solution near by; nothing has moved.
             apply_event(outcome, int(Event.NEAR_SNAPPING))
         if status == ControlStatus.SOLVED:
             rates = self._report.rates[: 2 * self.pair.count]
@@ -172,6 +180,11 @@ class ConcentricRobot:
             self._now.take(self._after)
             self._take(outcome, self._now)
             outcome["command"]["moving"] = 1
+
+    def _snaps(self) -> bool:
+        """Whether the torsion after the step belongs to another equilibrium than the one before."""
+        self.pair.guess_after(self._now, self._after.q, self._guess)
+        return bool(np.abs(self._after.torsion - self._guess).max() > _LARGEST_SURPRISE)
 
     def _take(self, outcome: np.ndarray, kinematics: PairKinematics) -> None:
         """Let the state stand where ``kinematics`` says."""

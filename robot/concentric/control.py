@@ -84,7 +84,7 @@ class ControlReport:
         relative_after: (3,) and after it.
         tracking_before: (3,) ε_A before the step, m.
         tracking_after: (3,) and after it.
-        scales: (2,) task scales s_k; 1 where the method has none.
+        scales: (2,) task scales s_k, and less where limits slow the motion down; else 1.
         limits_active: bit i: translation i of [A, B] (2n of them) is as fast as it may go; bit
             2n + i: an end or a neighbour holds it back; bit 4n + i: rotation i is at its cap.
         bound_violation: largest violation of (1) with its margins after the step, m.
@@ -177,15 +177,7 @@ class PairControl:
         np.subtract(desired, now.position[0], out=report.tracking_before)
         status = self._ask(now, feed_forward, report)
         if self._keeps_limits and not self._method.corrects:
-            problem = self._problem
-            problem.rates *= share_within(
-                problem.rates,
-                problem.box_lower,
-                problem.box_upper,
-                problem.gap_lower,
-                problem.gap_upper,
-                problem.rotation_speed,
-            )
+            self._slow_down()
         if status == ControlStatus.SOLVED:
             status = self._move(now, relative, after, report)
         if status != ControlStatus.SOLVED:
@@ -194,6 +186,20 @@ class PairControl:
         self._conclude(now, desired, relative, after, report)
         report.status = status
         return status
+
+    def _slow_down(self) -> None:
+        """Make the motion as small as every limit wants it; its direction stays."""
+        problem = self._problem
+        share = share_within(
+            problem.rates,
+            problem.box_lower,
+            problem.box_upper,
+            problem.gap_lower,
+            problem.gap_upper,
+            problem.rotation_speed,
+        )
+        problem.rates *= share
+        problem.scales *= share
 
     def _ask(
         self, now: PairKinematics, feed_forward: np.ndarray, report: ControlReport

@@ -220,6 +220,32 @@ def test_what_leads_toward_snapping_pauses_and_the_way_back_is_open() -> None:
     assert moved > 0
 
 
+@pytest.mark.parametrize("method", ["nspqp", "hqp"])
+def test_arms_led_into_the_fold_pause_and_never_jump(method: str) -> None:
+    """Turned by hand to just before the fold at 207 degrees, then led further: no margin helps."""
+    robot = ConcentricRobot(concentric({"stability_margin": 0.0, "motor_spacing_mm": 0.0}))
+    drive = TubeDrive(robot, method)
+    drive.obedient = False
+    q = np.tile([-0.385, -0.266, -0.149, 0.0, 0.0, 0.0], 2)
+    for degrees in (0.0, 60.0, 120.0, 160.0, 180.0, 195.0, 203.0, 206.0, 206.9):
+        q[[3, 9]] = np.deg2rad(degrees)
+        drive.input["measured_q"] = q
+        drive.tick(Request.DISABLE)
+        drive.tick(Request.ENABLE)
+    assert 0.0 < drive.outcome[0]["report"]["stability"].min() < 0.2
+    drive.obedient = True
+    further = robot._now.jacobian[0, :3, 3].copy()
+    drive.lead_to(drive.tip + 0.02 * further / np.linalg.norm(further))
+    for _ in range(400):
+        before = drive.tip
+        outcome = drive.tick()
+        assert np.linalg.norm(drive.tip - before) < 1e-3
+        assert np.all(outcome["report"]["stability"] > 0.0)
+        if drive.safety != Safety.ENABLED:
+            break
+    assert (drive.safety, reason(drive)) == (Safety.PAUSED, Event.NEAR_SNAPPING)
+
+
 def test_a_start_outside_of_what_tubes_can_be_is_refused_by_name() -> None:
     design = concentric().concentric
     outside = design.starts[0].model_copy(update={"translations_a_mm": (-100.0, -120.0, -50.0)})
