@@ -10,6 +10,7 @@ from hardware.kinematic_plant import KinematicPlant
 from hardware.tube_plant import TubePlant
 from robot.concentric.concentric_robot import ConcentricRobot
 from robot.concentric.design import METHODS
+from robot.concentric.stability_slope import stability_slope
 from robot.configuration import Configuration
 from robot.instrument_robot import InstrumentRobot
 from robot.records import Case, Coordinates, LeaderKind, Request, Solver
@@ -72,6 +73,15 @@ def warm_up_tubes(robot: ConcentricRobot) -> None:
     _request(loop, Request.EMERGENCY_STOP)
     _request(loop, Request.RESET)
     plant.close()
+    _come_near_snapping(robot)
+
+
+def _come_near_snapping(robot: ConcentricRobot) -> None:
+    """What is only computed near snapping, which the start is not."""
+    state, pair = robot.initial_state()[0], robot.pair
+    n, q, torsion = pair.count, state["q"], state["torsion"]
+    change, slope = np.zeros((n, 2 * n)), np.zeros(2 * n)
+    stability_slope(q[: 2 * n].copy(), torsion[:n].copy(), change, pair.tubes, slope)
 
 
 def _request(loop: ControlLoop, request: Request) -> None:

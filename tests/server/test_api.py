@@ -84,6 +84,9 @@ def test_a_clutched_leader_moves_the_tip_by_its_own_motion(driver: ApiClient) ->
     for step in range(101):
         pose = {"position_mm": [1000.0, 0.1 * step, 0.0], "orientation_wxyz": IDENTITY}
         driver.done("POST", "/leader", {**pose, "clutch": True})
+        if step == 0:
+            # Samples may follow each other faster than ticks: the anchor must be this one.
+            driver.until(lambda s: s["engaged"], "it leads")
     moved = driver.until(
         lambda s: (
             driver.call("POST", "/leader", {**pose, "clutch": True}).is_success

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import time
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numba.core.dispatcher import Dispatcher
 from pydantic import TypeAdapter
 
 from hardware.tube_plant import TubePlant
@@ -20,6 +22,7 @@ from robot.concentric.design import METHODS
 from robot.records import Request, Safety
 from scenes.experiments.tube_playing import played
 from server.control.concentric_loop import ConcentricLoop
+from server.control.warm_up import warm_up_tubes
 from server.recording.reader import Recording
 from server.recording.verify import verify
 from server.recording.writer import RecordingWriter
@@ -98,6 +101,24 @@ def test_bounds_hold_the_translations_that_are_told(recorded: list[np.ndarray]) 
         for arm in message["arms"]:
             bounds = zip(arm["lower_mm"], arm["translations_mm"], arm["upper_mm"], strict=True)
             assert all(low - 1e-6 <= value <= high + 1e-6 for low, value, high in bounds)
+
+
+def test_nothing_compiles_once_real_time_has_begun() -> None:
+    configuration = concentric()
+    robot = ConcentricRobot(configuration)
+    warm_up_tubes(robot)
+    plant = TubePlant(configuration, robot.initial_state()["q"][0])
+    loop = ConcentricLoop(robot, plant, configuration)
+    loop.step()
+    functions = [one for one in gc.get_objects() if isinstance(one, Dispatcher)]
+    before = [len(function.signatures) for function in functions]
+    loop.request = Request.ENABLE
+    loop.step()
+    loop.start_path(played("lissajous"))
+    for tick in range(200):
+        loop.settings["method"] = tick % len(METHODS)
+        loop.step()
+    assert [len(function.signatures) for function in functions] == before
 
 
 @pytest.fixture(scope="module")
