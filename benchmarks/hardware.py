@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.tick import percentiles
+from benchmarks.percentiles import percentiles
 from robot.configuration import Configuration
 from robot.records import LeaderKind, Safety
 from server.faults.bench import Bench

@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from benchmarks.tick import percentiles
+from benchmarks.percentiles import percentiles
 from hardware.physics.plant import PhysicsPlant
 from robot.configuration import Configuration
 from robot.instrument_robot import InstrumentRobot

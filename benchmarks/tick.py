@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
 from unittest import mock
@@ -20,6 +20,7 @@ import pink
 import pinocchio as pin
 from pink.tasks import FrameTask, PostureTask
 
+from benchmarks.percentiles import percentiles
 from hardware.kinematic_plant import KinematicPlant
 from robot import instrument_robot
 from robot.arm import Arm
@@ -32,12 +33,6 @@ from scenes.experiments import experiment
 from server.control.instrument_loop import InstrumentLoop
 
 _WARM_UP = 500
-
-
-def percentiles(nanoseconds: Sequence[int] | np.ndarray) -> dict[str, float]:
-    """Median and 99th percentile in microseconds."""
-    values = np.asarray(nanoseconds) * 1e-3
-    return {"p50": float(np.percentile(values, 50)), "p99": float(np.percentile(values, 99))}
 
 
 def _recorded_inputs(

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
-from benchmarks.tick import percentiles
+from benchmarks.percentiles import percentiles
 from hardware.tube_plant import TubePlant
 from robot.concentric.concentric_robot import ConcentricRobot
 from robot.concentric.design import METHODS

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.tick import percentiles
+from benchmarks.percentiles import percentiles
 from benchmarks.tubes import GeneralSolver, overlapping
 from robot.concentric.design import Concentric
 from robot.concentric.kinematics import SOLVED, solve_arm

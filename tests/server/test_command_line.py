@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -152,3 +153,19 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
     assert process.stderr.read() == b""
     process.stderr.close()
     process.wait()
+
+
+TESTS_ONLY = ("dynamixel_sdk", "hypothesis", "pink", "playwright", "pytest", "qpsolvers", "xarm")
+
+
+def test_the_commands_need_nothing_that_only_the_tests_install() -> None:
+    blocked = "; ".join(f"sys.modules[{name!r}] = None" for name in TESTS_ONLY)
+    program = (
+        f"import sys; {blocked}; from server.command_line import main; "
+        "import benchmarks.tubes; sys.exit(main(['--help']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True, text=True, check=False, env=module_environment(),
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
