@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, TimeoutError, expect
 
 from tests.browser_tests.conftest import VIEWPORT, Complaints
 from tests.browser_tests.console_page import SCENE_S, SLOW_S, ConsolePage
@@ -23,6 +24,7 @@ METHODS = {
     "5": "HQP",
 }
 PULL_MM = 6.0
+CHOICE_MS = 2000.0
 COMPILED_S = 300.0
 """The first start of a new version compiles the controller."""
 
@@ -36,14 +38,15 @@ def choose_robot(page: ConsolePage, robot: str) -> None:
         # A page that loads its scene without a graphics card stalls, and may lose its lease.
         page.take_control()
         if chooser.is_enabled():
-            chooser.select_option(robot)
+            with contextlib.suppress(TimeoutError):
+                chooser.select_option(robot, timeout=CHOICE_MS)
         page.page.wait_for_timeout(200)
         return "Starting: " in cover.inner_text() or driven() == robot
 
     def driven() -> object:
         return page.page.locator("body").get_attribute("data-driven")
 
-    eventually(starting, f"{robot} is being started", SLOW_S)
+    eventually(starting, f"{robot} is being started", 4.0 * SLOW_S)
     eventually(lambda: driven() == robot, f"the page is that of {robot}", SCENE_S)
     page.robot = robot
     eventually(lambda: page.state().get("control") == "running", "it runs", COMPILED_S)
