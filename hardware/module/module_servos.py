@@ -188,7 +188,7 @@ class ModuleServos:
             self._silent = False
             self._begin_anew(Event.SERVO_SILENT, "a servo was silent and answers again")
         else:
-            self._look_deeper()
+            self._look_deeper(answered == ALL)
         self._decide(now_ns)
         if not (follower.holding or self.event):
             self.message = ""
@@ -220,8 +220,12 @@ class ModuleServos:
 
     # Beside the cycle
 
-    def _look_deeper(self) -> None:
-        """Read what the cycle does not, of a servo that has just alerted or of the next in turn."""
+    def _look_deeper(self, complete: bool) -> None:
+        """Read what the cycle does not, of a servo that has just alerted or of the next in turn.
+
+        After a cycle that was not ``complete`` the next one decides whether a servo is silent: a
+        read that fails too would only delay it.
+        """
         self._cycles += 1
         alerting = [
             index
@@ -230,7 +234,7 @@ class ModuleServos:
         ]
         if alerting:
             self._read_status(alerting[0])
-        elif self._cycles % self._status_every == 0:
+        elif complete and self._cycles % self._status_every == 0:
             self._next_status = (self._next_status + 1) % SERVOS
             if not self.watch.missed[self._next_status]:
                 self._read_status(self._next_status)
