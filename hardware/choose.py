@@ -41,13 +41,16 @@ def breakable_tubes(configuration: Configuration, q: np.ndarray) -> Plant:
     """Simulated concentric-tube arms that stand at ``q`` (4n,) and may be broken on request."""
     from hardware.tube_plant import TubePlant
 
-    return FaultyPlant(TubePlant(configuration, q), plant_faults("concentric"))
+    return FaultyPlant(TubePlant(configuration, q), plant_faults(configuration))
 
 
 def breakable_plant(configuration: Configuration, x: np.ndarray) -> Plant:
     """As :func:`make_plant`; a simulated robot may then be broken on request."""
     plant = make_plant(configuration, x)
-    return FaultyPlant(plant) if plant.spec.simulated else plant
+    if not plant.spec.simulated:
+        return plant
+    unit = plant if isinstance(plant, PhysicsPlant) else None
+    return FaultyPlant(plant, plant_faults(configuration), unit)
 
 
 def _real(configuration: Configuration, x: np.ndarray) -> Plant:

@@ -10,10 +10,13 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from hardware.plant import Measurement, Plant, PlantSpec
+from hardware.tension_unit.module import UnitFault
+from robot.configuration import Configuration
 from robot.errors import UnknownName
 from robot.records import Readiness
 from robot.safety import Event
@@ -41,6 +44,9 @@ class PlantFault:
         offset_rad: by how much, rad (a tube's translation: m); NaN for no number at all.
         stuck_joint: the joint that stays where it is, whatever it is told.
         stuck_servo: likewise among the servos.
+        module: the module of the tension-feedback unit that breaks.
+        unit: how it breaks.
+        tracker_lost: whether the tip tracker's last pose only gets older.
         late_s: how much too late the next tick begins, s; once.
         fails: whether the plant's own code raises.
         shows_nothing: whether the truth, which is for pictures only, is no number.
@@ -56,6 +62,9 @@ class PlantFault:
     offset_rad: float = 0.0
     stuck_joint: int = _NOBODY
     stuck_servo: int = _NOBODY
+    module: int = _NOBODY
+    unit: UnitFault = UnitFault.NONE
+    tracker_lost: bool = False
     late_s: float = 0.0
     fails: bool = False
     shows_nothing: bool = False
@@ -95,6 +104,17 @@ FAULTS: dict[str, PlantFault] = {
     "servo-overload": PlantFault("A servo is overloaded", event=Event.SERVO_FAULT),
     "arm-lost": PlantFault("The arm is gone", event=Event.ARM_LOST, readiness=_OUT),
     "arm-error": PlantFault("The arm reports an error", event=Event.ARM_FAULT, readiness=_BROKEN),
+    "cell-missing": PlantFault(
+        "A torque cell gives no reading", module=2, unit=UnitFault.CELL_MISSING
+    ),
+    "cell-saturated": PlantFault(
+        "A torque cell is at its end", module=1, unit=UnitFault.CELL_SATURATED
+    ),
+    "cell-flat": PlantFault(
+        "A torque cell's reading stays as it is", module=0, unit=UnitFault.CELL_FLAT
+    ),
+    "tendon-broken": PlantFault("A tendon breaks", module=0, unit=UnitFault.TENDON_BROKEN),
+    "tracker-lost": PlantFault("The tracker does not see the tip", tracker_lost=True),
     "picture-impossible": PlantFault("The picture cannot be drawn", shows_nothing=True),
 }
 """What can be injected into the simulated instrument, by name."""
@@ -115,9 +135,21 @@ TUBE_FAULTS: dict[str, PlantFault] = {
 """What can be injected into simulated concentric-tube arms."""
 
 
-def plant_faults(robot: str) -> dict[str, PlantFault]:
-    """What can be injected into the simulated robot of that name."""
-    return TUBE_FAULTS if robot == "concentric" else FAULTS
+def plant_faults(configuration: Configuration) -> dict[str, PlantFault]:
+    """What can be injected into the simulated robot of that configuration."""
+    if configuration.robot == "concentric":
+        return TUBE_FAULTS
+    simulation = configuration.simulation
+    if simulation.actuation == "tension-unit" and simulation.plant == "physics":
+        return FAULTS
+    return {name: fault for name, fault in FAULTS.items() if fault.unit is UnitFault.NONE}
+
+
+class BreakableUnit(Protocol):
+    """A tension-feedback unit whose modules can be broken."""
+
+    def break_module(self, module: int, fault: UnitFault) -> None:
+        """Break ``module`` (0 to 3) from the next tick on; ``UnitFault.NONE`` mends it."""
 
 
 class FaultyPlant:
@@ -126,6 +158,7 @@ class FaultyPlant:
     Args:
         plant: the simulated robot.
         faults: what can be injected into it, by name.
+        unit: what breaks of its tension-feedback unit; None without one.
 
     Attributes:
         spec: of the wrapped plant.
@@ -133,14 +166,20 @@ class FaultyPlant:
         active: name of the fault that acts now; empty for none.
     """
 
-    def __init__(self, plant: Plant, faults: Mapping[str, PlantFault] = FAULTS) -> None:
-        self._plant, self.faults = plant, faults
+    def __init__(
+        self,
+        plant: Plant,
+        faults: Mapping[str, PlantFault] = FAULTS,
+        unit: BreakableUnit | None = None,
+    ) -> None:
+        self._plant, self.faults, self._unit = plant, faults, unit
         self.spec: PlantSpec = plant.spec
         self.active = ""
         self._fault: PlantFault | None = None
         measured = plant.read()
         self._q, self._servo = measured.q.copy(), measured.servo.copy()
         self._held_q, self._held_servo = self._q.copy(), self._servo.copy()
+        self._tracker = measured.tracker.copy()
         self._command: np.ndarray | None = None
         self._age_s, self._late_s = 0.0, 0.0
 
@@ -152,14 +191,22 @@ class FaultyPlant:
         """
         if name not in self.faults:
             raise UnknownName("fault", name, tuple(self.faults))
+        self.clear()
         measured = self._plant.read()
         self._held_q[:], self._held_servo[:] = measured.q, measured.servo
-        self.active, self._fault = name, self.faults[name]
-        self._age_s, self._late_s = 0.0, self._fault.late_s
+        self.active, fault = name, self.faults[name]
+        self._fault = fault
+        if self._unit is not None and fault.module != _NOBODY:
+            self._unit.break_module(fault.module, fault.unit)
+        self._age_s, self._late_s = 0.0, fault.late_s
+        self._tracker = measured.tracker.copy()
 
     def clear(self) -> None:
         """Mend it."""
+        fault = self._fault
         self.active, self._fault = "", None
+        if self._unit is not None and fault is not None and fault.module != _NOBODY:
+            self._unit.break_module(fault.module, UnitFault.NONE)
 
     def read(self) -> Measurement:
         """The newest measurement, as the fault leaves it."""
@@ -176,12 +223,18 @@ class FaultyPlant:
         return measured._replace(
             q=self._q,
             servo=self._servo,
+            tracker=self._lost_tracker() if fault.tracker_lost else measured.tracker,
             valid=measured.valid and fault.valid,
             age_s=max(measured.age_s, self._age_s) if fault.silent else measured.age_s,
             contact_n=measured.contact_n + fault.contact_n,
             event=int(fault.event) or measured.event,
             readiness=int(fault.readiness) or measured.readiness,
         )
+
+    def _lost_tracker(self) -> np.ndarray:
+        lost = self._tracker.copy()
+        lost["age_s"] += self._age_s
+        return lost
 
     def write(self, command: np.ndarray) -> None:
         """Pass the command on, except what is stuck."""

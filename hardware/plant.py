@@ -38,9 +38,10 @@ class Measurement(NamedTuple):
     Attributes:
         q: (7,) joint angles, rad.
         servo: (4,) servo angles, rad.
-        tension: (4,) tendon tension, N.
+        tension: (4,) tendon tension, N; NaN of a cell without a reading.
         tracker: () ``robot.records.TRACKER``: the newest tip pose, ``sequence`` 0 without one.
         load: (4,) load of each servo, share of its largest, -1 to 1.
+        tension_cells: whether torque cells measure the tensions.
         contact_n: largest contact force on the instrument that a sensor reads, N.
         valid: whether every device answered.
         age_s: age of the oldest value, s.
@@ -54,6 +55,7 @@ class Measurement(NamedTuple):
     tension: np.ndarray
     tracker: np.ndarray
     load: np.ndarray
+    tension_cells: bool = False
     contact_n: float = 0.0
     valid: bool = True
     age_s: float = 0.0

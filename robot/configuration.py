@@ -24,6 +24,9 @@ from robot.section import (
     Vector,
     unit,
 )
+from robot.sensing.design import Sensing
+from robot.tension.design import Tendons
+from robot.tension_unit_design import TensionUnit
 
 SCHEMA_VERSION = 1
 
@@ -209,6 +212,7 @@ class Simulation(Section):
     plant: Literal["physics", "kinematic"]
     preset: Literal["ideal", "paper", "harsh"]
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)]
+    actuation: Literal["servos", "tension-unit"]
     board: Literal["none", "pegboard", "silicon-sine", "silicon-arc", "ring-board"]
 
 
@@ -285,6 +289,11 @@ class Stylus(Section):
     timeout_ms: Positive
     force_stiffness_n_m: NotNegative
     force_limit_n: Annotated[float, Field(ge=0, le=3.3)]
+    force_source: Literal["spring", "sensed"]
+    force_scale: Annotated[float, Field(ge=0, le=10)]
+    force_damping_n_s_m: Annotated[float, Field(ge=0, le=20)]
+    force_delay_ms: Annotated[float, Field(ge=0, le=200)]
+    pose_resolution_mm: Annotated[float, Field(ge=0, le=1)]
 
 
 class Server(Section):
@@ -349,9 +358,12 @@ class Configuration(Section):
     control: Control
     simulation: Simulation
     compensation: Compensation
+    tendons: Tendons
     tracker: Tracker
     hardware: Hardware
     servos: Servos
+    sensing: Sensing
+    tension_unit: TensionUnit
     stylus: Stylus
     server: Server
     arm: Arm

@@ -1,7 +1,7 @@
 """The first robot: a 7-DoF arm that carries a tendon-driven continuum instrument.
 
 ``tick`` is a pure function of the state and the tick's input. It goes straight down: safety,
-teleoperation, commands, priority, integration, kinematics.
+teleoperation, commands, priority, integration, kinematics, tendons, sensing.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from robot.arm import Arm
 from robot.calibration import Calibration
 from robot.clearance import measure_clearance
 from robot.configuration import Configuration
+from robot.instrument import shaft
 from robot.instrument_tick import (
     SOLVE_CLOSED_FORM,
     SOLVE_QP,
@@ -26,8 +27,13 @@ from robot.priority.closed_form import augmented, polar_columns, prioritized
 from robot.priority.levels import PRESETS, Plan, plan
 from robot.priority.lexicographic import LexicographicProblem, error_damping
 from robot.priority.limits import share_within
-from robot.records import INPUT, OUTCOME, Case, Coordinates, Solver
+from robot.records import ARM_JOINTS, INPUT, OUTCOME, Case, Coordinates, Solver
+from robot.sensing.joint_estimate import ESTIMATE, SAMPLE
+from robot.sensing.parameters import estimator_parameters
+from robot.sensing.sense import say_off, sense, sensing_is_on
 from robot.start import start_configuration
+from robot.tension.distribution import nearest_bounded, solve_bounded
+from robot.tension.tendon_command import finish_tendons, prepare_tendons
 from robot.urdf import urdf_text
 
 
@@ -65,6 +71,11 @@ class _Work:
         self.measured_q = np.zeros(7)
         self.joints = np.zeros((8, 3))
         self.flange = np.zeros((3, 3))
+        self.shaft_base, self.shaft_end = np.zeros(3), np.zeros(3)
+        self.shaft_rotation = np.zeros((3, 3))
+        self.rows, self.right = np.zeros((2, 4)), np.zeros(2)
+        self.least, self.none = np.zeros(4), np.zeros(4)
+        self.sample, self.found = np.zeros(1, SAMPLE), np.zeros(1, ESTIMATE)
 
 
 class InstrumentRobot:
@@ -90,6 +101,7 @@ class InstrumentRobot:
         self.configuration = configuration
         self.calibration = calibration or Calibration()
         self.parameters = parameters(configuration, calibration)
+        self._model, self._sensing = estimator_parameters(configuration, self.calibration)
         self._arm = Arm(urdf_text(configuration))
         self._work = _Work()
         length = configuration.priority.characteristic_length_m
@@ -99,6 +111,7 @@ class InstrumentRobot:
             LexicographicProblem(one, self._work.matrix, self._work.upper, self._work.lower)
             for one in plans
         )
+        self._most = np.full(4, self.parameters["tension_limit"][0])
         self._start = start_configuration(configuration, self._arm, self.parameters)
 
     def initial_state(self, x: np.ndarray | None = None) -> np.ndarray:
@@ -142,6 +155,8 @@ class InstrumentRobot:
             rates, status = self._problems[left].solve(work.preferred, damping)
             self._integrate(tick_input, outcome, status, rates)
         self._conclude(outcome, tick_input)
+        self._tend(outcome, tick_input)
+        self._sense(outcome, tick_input)
 
     def _integrate(
         self, tick_input: np.ndarray, outcome: np.ndarray, status: int, rates: np.ndarray
@@ -168,6 +183,42 @@ class InstrumentRobot:
         if measures:
             arm.place(work.measured_q, work.joints, work.flange)
             measure_clearance(outcome, tick_input, work.joints, work.flange, self.parameters)
+
+    def _tend(self, outcome: np.ndarray, tick_input: np.ndarray) -> None:
+        work, p = self._work, self.parameters
+        rows, right, least = work.rows, work.right, work.least
+        if not prepare_tendons(outcome, tick_input, p, rows, right, least):
+            return
+        wanted = solve_bounded(rows, right, work.none, least, self._most)
+        if wanted is None:
+            wanted = nearest_bounded(rows, right, least, self._most)
+        finish_tendons(outcome, tick_input, p, wanted, rows, right)
+
+    def _sense(self, outcome: np.ndarray, tick_input: np.ndarray) -> None:
+        work, arm = self._work, self._arm
+        if not sensing_is_on(tick_input):
+            say_off(outcome)
+            return
+        arm.place(work.measured_q, work.joints, work.flange)
+        shaft(
+            work.joints[ARM_JOINTS],
+            work.flange,
+            self.parameters,
+            work.shaft_base,
+            work.shaft_end,
+            work.shaft_rotation,
+        )
+        sense(
+            outcome,
+            tick_input,
+            work.shaft_end,
+            work.shaft_rotation,
+            self.parameters,
+            self._model,
+            self._sensing,
+            work.sample,
+            work.found,
+        )
 
     def _closed_form(self, case: int, tick_input: np.ndarray, outcome: np.ndarray) -> np.ndarray:
         work, settings = self._work, tick_input["settings"][0]

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from robot.compensation import commanded_bend, expected_bend, follow_setting
+from robot.compensation import expected_bend, follow_setting
 from robot.compiled import compiled
 from robot.records import RecordFields, Safety
 from robot.safety import (
@@ -18,15 +18,21 @@ from robot.safety import (
     watch_lateness,
     watch_leader,
 )
-from robot.tendons import bend_from_servos, servo_angles
+from robot.tendons import bend_from_servos
+from robot.tension.cells import cells_read, follow_cells
+from robot.tension.records import TendonMode
+from robot.tension.tendon_command import FROM_MEASURED, holds_tensions
 
-_ENABLED, _ENABLE = int(Safety.ENABLED), int(Event.ENABLE)
+_ENABLED, _PAUSED = int(Safety.ENABLED), int(Safety.PAUSED)
+_ENABLE = int(Event.ENABLE)
 _LOST, _TRACKING = int(Event.MEASUREMENT_LOST), int(Event.TRACKING_ERROR)
 _CONTACT, _CLEARANCE, _TROCAR = (
     int(Event.CONTACT_FORCE),
     int(Event.CLEARANCE),
     int(Event.TROCAR_LEFT),
 )
+_UNKNOWN, _RUNS = int(Event.TENSION_UNKNOWN), int(Event.TENDON_RUNS)
+_TENSION = int(TendonMode.TENSION)
 _CONTACT_MARGIN = 1.25
 _CLEARANCE_MARGIN = 0.001
 
@@ -41,18 +47,25 @@ def tracking_distance(x: np.ndarray, measured_q: np.ndarray) -> float:
 
 
 @compiled
-def servo_tracking_distance(
-    s: RecordFields, measured_servo: np.ndarray, parameters: np.ndarray
-) -> float:
-    """Largest distance in rad between commanded and measured servo angles."""
-    p = parameters[0]
-    told, servo = np.empty(2), np.empty(4)
-    commanded_bend(s, parameters, told)
-    servo_angles(told[0], told[1], p.pitch_radius, p.pulley_radius, servo)
+def servo_tracking_distance(s: RecordFields, measured_servo: np.ndarray) -> float:
+    """Largest distance in rad between commanded and measured angles of servos that hold one."""
     largest = 0.0
     for i in range(4):
-        largest = max(largest, abs(servo[i] - measured_servo[i]))
+        if s.tendon_mode[i] != _TENSION:
+            largest = max(largest, abs(s.tendon_servo[i] - measured_servo[i]))
     return largest
+
+
+@compiled
+def _watch_tensions(outcome: np.ndarray, i: RecordFields, p: RecordFields) -> None:
+    """Pause where tensions are to be held and a cell is blind; fault where a tendon ran away."""
+    s = outcome[0].state
+    if holds_tensions(i) and not cells_read(s, i, p):
+        apply_event(outcome, _UNKNOWN)
+    for k in range(4):
+        off = p.pulley_radius * abs(i.measured_servo[k] - s.tendon_servo[k])
+        if s.tendon_mode[k] == _TENSION and not off <= p.tendon_travel:
+            apply_event(outcome, _RUNS)
 
 
 @compiled
@@ -110,6 +123,10 @@ def _take_measured(outcome: np.ndarray, i: RecordFields, parameters: np.ndarray)
     u, v = bend_from_servos(i.measured_servo, p.pitch_radius, p.pulley_radius)
     follow_setting(s, i.settings.compensation, 1.0)
     expected_bend(s, u, v, parameters)
+    if holds_tensions(i) or s.tendon_map != 0:
+        s.tendon_map = FROM_MEASURED
+        for k in range(4):
+            s.tendon_servo[k] = i.measured_servo[k]
 
 
 @compiled
@@ -129,6 +146,7 @@ def decide(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) 
     i = tick_input[0]
     p = parameters[0]
     takes_measured = take_request(outcome, i)
+    follow_cells(s, i)
     if plant_speaks(outcome, i):
         return False
     if not _measured(i):
@@ -137,14 +155,12 @@ def decide(outcome: np.ndarray, tick_input: np.ndarray, parameters: np.ndarray) 
     watch_lateness(outcome, i, p.late_tick)
     _watch_contact(outcome, i, p)
     _watch_clearance(outcome, i, p)
-    if takes_measured and s.safety == _ENABLED:
+    _watch_tensions(outcome, i, p)
+    if takes_measured and s.safety in (_ENABLED, _PAUSED):
         _take_measured(outcome, i, parameters)
         return True
     follows = tracking_distance(s.x, i.measured_q) <= p.tracking_error
-    if not (
-        follows
-        and servo_tracking_distance(s, i.measured_servo, parameters) <= p.servo_tracking_error
-    ):
+    if not (follows and servo_tracking_distance(s, i.measured_servo) <= p.servo_tracking_error):
         apply_event(outcome, _TRACKING)
     watch_leader(outcome, i)
     return False

@@ -384,8 +384,10 @@ def conclude(
 
 @compiled
 def wake(outcome: np.ndarray, parameters: np.ndarray) -> None:
-    """What the state remembers of sensing when the robot wakes up: nothing."""
+    """What the state remembers when the robot wakes up: where the servos are, else nothing."""
     s = outcome[0].state
+    for i in range(4):
+        s.tendon_servo[i] = outcome[0].command.servo[i]
     start_correction(s)
     s.contact_allowance = parameters[0].contact_force
     s.clearance_allowance = parameters[0].clearance

@@ -51,6 +51,16 @@ PARAMETERS = np.dtype(
         ("friction", "f8", 2),
         ("stick", "f8", 2),
         ("chord", "f8"),
+        ("tendon_stiffness", "f8"),
+        ("pretension", "f8", 4),
+        ("bending_stiffness", "f8"),
+        ("capstan", "f8"),
+        ("coulomb", "f8"),
+        ("tension_full_scale", "f8"),
+        ("cell_flat", "f8"),
+        ("tension_limit", "f8"),
+        ("tension_rate", "f8"),
+        ("tendon_travel", "f8"),
         ("alignment_tolerance", "f8"),
         ("speed_max", "f8"),
         ("speed_min", "f8"),
@@ -68,7 +78,8 @@ PARAMETERS = np.dtype(
 )
 """Fields as in ``robot.configuration`` and ``robot.calibration``, in m, rad, s, N.
 ``rotation_flange_segment``: the segment's base frame in the flange frame; its z axis is the shaft's
-direction."""
+direction. ``tendon_stiffness`` to ``coulomb``: of tendons and backbone, as ``robot.sensing`` has
+them; ``tension_*``, ``tendon_travel``: of the table [tendons]; ``cell_flat``: of [tension_unit]."""
 
 
 def _module_rotation(configuration: Configuration) -> np.ndarray:
@@ -93,16 +104,32 @@ def chord_ratio(instrument: Instrument) -> float:
     return instrument.segment_length_m / (squared * instrument.tendon_pitch_radius_m)
 
 
+def _tendons(configuration: Configuration, calibration: Calibration) -> dict[str, object]:
+    """What tensions are held by; what was calibrated replaces what is assumed."""
+    section, assumed, found = configuration.tendons, configuration.sensing, calibration.tendons
+    known = found or assumed
+    return {
+        "tendon_stiffness": known.tendon_stiffness_n_m,
+        "pretension": known.pretension_n,
+        "bending_stiffness": known.bending_stiffness_n_m2,
+        "capstan": found.friction if found else assumed.tendon_friction,
+        "coulomb": found.friction_n if found else assumed.tendon_friction_n,
+        "tension_full_scale": assumed.tension_full_scale_n,
+        "cell_flat": configuration.tension_unit.cell_flat_s,
+        "tension_limit": section.tension_limit_n,
+        "tension_rate": section.tension_rate_n_s,
+        "tendon_travel": section.travel_mm * 1e-3,
+    }
+
+
 def parameters(configuration: Configuration, calibration: Calibration | None = None) -> np.ndarray:
     """The (1,) read-only record of ``configuration`` and ``calibration`` (by default: none needed).
 
     Joint limits already hold the margin that is kept from the mechanical stops.
     """
-    record = np.zeros(1, PARAMETERS)
-    tendons = calibration or Calibration()
+    record, tendons = np.zeros(1, PARAMETERS), calibration or Calibration()
     limits, commands = configuration.limits, configuration.commands
-    margin = _degrees(limits.joint_margin_deg)
-    joints = configuration.arm.joints
+    margin, joints = _degrees(limits.joint_margin_deg), configuration.arm.joints
     instrument, module = configuration.instrument, configuration.module
     values: dict[str, object] = {
         "shaft_base": module.shaft_base_m,
@@ -145,6 +172,7 @@ def parameters(configuration: Configuration, calibration: Calibration | None = N
         "friction": tendons.friction_rad,
         "stick": tendons.stick_rad,
         "chord": chord_ratio(instrument),
+        **_tendons(configuration, tendons),
         "alignment_tolerance": _degrees(configuration.teleoperation.alignment_tolerance_deg),
         "speed_max": commands.speed_max_mm_s * 1e-3,
         "speed_min": commands.speed_min_mm_s * 1e-3,

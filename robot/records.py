@@ -15,7 +15,10 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-SCHEMA_VERSION = 4
+from robot.sensing.records import CURVATURE_MODES, SENSED, SENSED_COUNT
+from robot.tension.records import TENDON_COMMAND, TENDON_SETTINGS, TENDON_STATE
+
+SCHEMA_VERSION = 7
 
 RecordFields: TypeAlias = Any
 """A record or part of one inside compiled code, where its fields are attributes."""
@@ -161,10 +164,13 @@ SETTINGS = np.dtype(
         ("lock_arm", "i8"),
         ("compensation", "i8"),
         ("use_tracker", "i8"),
+        ("sensing", "i8"),
+        *TENDON_SETTINGS,
         ("lambda_reference", "f8"),
     ]
 )
-"""Those of the instrument. ``lock_arm``: the joints stand still and the segment alone follows."""
+"""Those of the instrument. ``lock_arm``: the joints stand still and the segment alone follows;
+``sensing``: whether shape and force are estimated."""
 
 LEADER = np.dtype(
     [
@@ -218,6 +224,7 @@ INPUT = np.dtype(
         ("measured_q", "f8", ARM_JOINTS),
         ("measured_servo", "f8", SERVOS),
         ("measured_tension", "f8", SERVOS),
+        ("tension_cells", "i8"),
         ("measured_load", "f8", SERVOS),
         ("measured_contact", "f8"),
         ("tracker", TRACKER),
@@ -225,9 +232,10 @@ INPUT = np.dtype(
         ("settings", SETTINGS),
     ]
 )
-"""That of the instrument. ``measured_tension`` in N; ``measured_load``: of each servo, share of its
-largest, -1 to 1; ``measured_contact``: largest force in N on the instrument that a sensor of the
-scene reads, 0 without one."""
+"""That of the instrument. ``measured_tension`` in N, NaN of a cell without a reading;
+``tension_cells``: whether the robot measures tensions; ``measured_load``: of each servo, share of
+its largest, -1 to 1; ``measured_contact``: largest force in N on the instrument that a sensor of
+the scene reads, 0 without one."""
 
 SHARED_STATE: Fields = [
     ("tick", "i8"),
@@ -281,6 +289,10 @@ STATE = np.dtype(
         ("clearance_part", "i8"),
         ("clearance_allowance", "f8"),
         ("trocar_distance", "f8"),
+        *TENDON_STATE,
+        ("sensed_time", "f8"),
+        ("sensed_count", "i8"),
+        ("sensed", SENSED, SENSED_COUNT),
     ]
 )
 """That of the instrument. ``x`` is the commanded configuration; the ``arm_*`` and ``tip_*`` fields
@@ -292,12 +304,14 @@ then angular, of the point that coincides with the base origin, base frame).
 force in N above which motion pauses; ``clearance``: smallest distance in m between arm, shaft
 and body wall where they were measured, of the pair ``clearance_part`` (see
 ``robot.clearance``); ``clearance_allowance``: the clearance below which motion pauses;
-``trocar_distance``: of the measured shaft from the trocar, m."""
+``trocar_distance``: of the measured shaft from the trocar, m; ``sensed``: the last measurements, in
+a ring of which ``sensed_count`` were written, on the clock ``sensed_time`` (s)."""
 
 COMMAND = np.dtype(
     [
         ("q", "f8", ARM_JOINTS),
         ("servo", "f8", SERVOS),
+        *TENDON_COMMAND,
         ("moving", "i8"),
     ]
 )
@@ -327,10 +341,22 @@ REPORT = np.dtype(
         ("residual_rcm", "f8"),
         ("residual_linear", "f8"),
         ("residual_angular", "f8"),
+        ("estimate_fault", "i8"),
+        ("estimate_force", "f8", 3),
+        ("estimate_force_covariance", "f8", (3, 3)),
+        ("estimate_modes", "f8", CURVATURE_MODES),
+        ("estimate_position", "f8", 3),
+        ("estimate_wxyz", "f8", 4),
+        ("estimate_tension", "f8", SERVOS),
     ]
 )
-"""What the instrument's controller did. ``residual_*``: norms of what each level could not do, m/s
-and rad/s. ``limits_active``: see ``priority.limits``."""
+"""What the instrument's controller did, and what its sensing found. ``residual_*``: norms of
+what each level could not do, m/s and rad/s. ``limits_active``: see ``priority.limits``.
+``estimate_fault``: a ``robot.sensing.faults.SensingFault``; while it is not NONE, the estimate is
+not valid and its numbers are zero. ``estimate_force``: of the environment on the tip, N, base
+frame, with its covariance; ``estimate_modes``: curvature from the measured end of the shaft on, see
+``robot.sensing.curvature_modes``; ``estimate_position``, ``estimate_wxyz``: of the tip, base frame;
+``estimate_tension`` at the segment's base, N."""
 
 OUTCOME = np.dtype([("state", STATE), ("command", COMMAND), ("report", REPORT)])
 """What ``tick`` returns: the next state, the command, the report."""
@@ -356,6 +382,7 @@ TRUTH = np.dtype(
         ("tension", "f8", SERVOS),
         ("contact_count", "i8"),
         ("contact_force", "f8"),
+        ("contact_wrench", "f8", 6),
         ("rings_passed", "i8"),
         ("rings_touched", "i8"),
         ("ball_position", "f8", 3),
@@ -366,8 +393,9 @@ TRUTH = np.dtype(
 )
 """Where the instrument is. ``trocar_position``: where the trocar is, against which the RCM error
 counts; ``tension`` in N; ``contact_force``: largest contact force on the instrument in N;
-``rings_*``: a bit for each ring of the board; ``ball_progress``: 0 at the groove's start, 1 at its
-end."""
+``contact_wrench``: of all contacts on the instrument together, force in N and moment about the tip
+in N m, base frame; ``rings_*``: a bit for each ring of the board; ``ball_progress``: 0 at the
+groove's start, 1 at its end."""
 
 HEADER = np.dtype(
     [

@@ -47,6 +47,8 @@ class Event(IntEnum):
     CONTROL_LATE = 24
     NEAR_SNAPPING = 25
     RELATIVE_ERROR = 26
+    TENSION_UNKNOWN = 27
+    TENDON_RUNS = 28
 
 
 class Transition(NamedTuple):
@@ -109,6 +111,9 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition(_E, Event.CONTROL_LATE, _P),
     Transition(_E, Event.NEAR_SNAPPING, _P),
     Transition(_E, Event.RELATIVE_ERROR, _P),
+    Transition(_E, Event.TENSION_UNKNOWN, _P),
+    Transition(_E, Event.TENDON_RUNS, _F),
+    Transition(_P, Event.TENDON_RUNS, _F),
 )
 """Every transition there is. An event that is not listed for a state leaves the state as it is; if
 it was an operator's request, it is refused."""
@@ -179,6 +184,14 @@ REASONS: dict[Event, tuple[str, str]] = {
     Event.RELATIVE_ERROR: (
         "arm B cannot keep its place beside arm A",
         "enable, then move back or more slowly",
+    ),
+    Event.TENSION_UNKNOWN: (
+        "a torque cell gives no usable reading, and tendons were to hold a tension",
+        "mend the cell or hold positions, then enable",
+    ),
+    Event.TENDON_RUNS: (
+        "a tendon that holds its tension ran away: broken, slipped, or pushed too far",
+        "look at the tendon; hold positions if it is whole; then reset",
     ),
 }
 """For each event that led into the present state: why, and what to do."""

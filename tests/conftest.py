@@ -5,14 +5,18 @@ from __future__ import annotations
 import functools
 import os
 import random
+import sys
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from xdist.remote import Producer
 from xdist.scheduler import LoadScopeScheduling
 
+from robot.configuration import Configuration
 from tests import browser
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -31,6 +35,29 @@ def own_audit_log(tmp_path_factory: pytest.TempPathFactory) -> None:
     os.environ["XDG_STATE_HOME"] = str(tmp_path_factory.mktemp("state"))
 
 
+@pytest.fixture(autouse=True, scope="session")
+def starts_found_once() -> Iterator[None]:
+    """Find the start of a configuration once: it takes each new robot 0.3 s.
+
+    That it always is the same is tested in ``robot/test_start.py``, which does without this.
+    """
+    robots = sys.modules.get("robot.instrument_robot")
+    if robots is None:
+        yield
+        return
+    find, found = robots.start_configuration, dict[tuple[str, bytes], np.ndarray]()
+
+    def find_once(configuration: Configuration, arm: Any, parameters: np.ndarray) -> np.ndarray:
+        key = configuration.model_dump_json(), parameters.tobytes()
+        if key not in found:
+            found[key] = find(configuration, arm, parameters)
+        return found[key].copy()
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(robots, "start_configuration", find_once)
+        yield
+
+
 @pytest.fixture
 def rng(request: pytest.FixtureRequest) -> np.random.Generator:
     """Random numbers that differ from test to test but never from run to run."""
@@ -47,18 +74,22 @@ def chromium() -> str:
 
 
 class ByConsole(LoadScopeScheduling):  # type: ignore[misc] # xdist has no types
-    """Keeps together on one processor what shares a console or a file's fixtures."""
+    """Keeps together on one processor what shares a console, runs, or a file's fixtures."""
 
     def _split_scope(self, nodeid: str) -> str:
         file = nodeid.partition("::")[0]
         if "browser_tests" in file:
             return "browser"
-        return "console" if _shares_the_console(file) else file
+        return next((what for what, word in _SHARED.items() if word in _text(file)), file)
+
+
+_SHARED = {"console": "tests.server.api_client", "runs": "headless.named("}
+"""What several files share, and by which words in them one sees it."""
 
 
 @functools.cache
-def _shares_the_console(file: str) -> bool:
-    return "tests.server.api_client" in (ROOT / file).read_text(encoding="utf-8")
+def _text(file: str) -> str:
+    return (ROOT / file).read_text(encoding="utf-8")
 
 
 @pytest.hookimpl(optionalhook=True)

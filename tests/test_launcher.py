@@ -119,6 +119,24 @@ def _leftovers(folder: Path) -> list[str]:
     return [path.name for path in folder.iterdir() if path.name.startswith((".venv.p", ".venv.o"))]
 
 
+def _until_it_exists(path: Path) -> None:
+    deadline = time.monotonic() + 30
+    while not path.exists():
+        assert time.monotonic() < deadline, f"{path} does not appear"
+        time.sleep(0.01)
+
+
+def _kill_when_it_sets_up(folder: Path) -> None:
+    """Start it, and end it in the middle of making the environment."""
+    process = _background(folder)
+    try:
+        _until_it_exists(folder / f".venv.partial-{process.pid}" / "bin" / "python")
+    finally:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+    assert len(_leftovers(folder)) == 1
+
+
 def test_the_program_gets_its_arguments_and_replaces_the_launcher(project: Path) -> None:
     with _background(project, "run", "two words", "") as process:
         output, errors = process.communicate()
@@ -159,35 +177,40 @@ def test_a_warm_start_adds_less_than_0_3_s(project: Path) -> None:
     assert fastest(project / "keyhole") - fastest(project / ".venv" / "bin" / "keyhole") < 0.3
 
 
-def test_a_killed_set_up_is_repaired_by_the_next(project: Path) -> None:
-    (project / ".venv" / set_up.STAMP).unlink()
-    process = _background(project)
-    deadline = time.monotonic() + 30
-    while not list(project.glob(".venv.partial-*/bin/python")) and time.monotonic() < deadline:
-        time.sleep(0.01)
-    os.killpg(process.pid, signal.SIGKILL)
-    process.communicate()
-    assert len(_leftovers(project)) == 1
+def test_what_is_outdated_is_set_up_anew(project: Path, tmp_path: Path) -> None:
+    """Each reason by itself: without it nothing is set up."""
+    home, pins = project / ".venv", project / "constraints.txt"
+    for missing in ([home / set_up.STAMP], list((home / "bin").glob("python*"))):
+        for path in missing:
+            path.rename(tmp_path / path.name)
+        _kill_when_it_sets_up(project)
+        for path in missing:
+            (tmp_path / path.name).rename(path)
+        assert _start(project).stderr == ""
+    before = pins.read_text()
+    pins.write_text("# moved\n")
+    _kill_when_it_sets_up(project)
+    pins.write_text(before)
+    assert _start(project).stderr == ""
+
+
+def test_a_killed_set_up_is_repaired_by_the_next_for_which_a_second_waits(project: Path) -> None:
+    for link in (project / ".venv" / "bin").glob("python*"):
+        link.unlink()
+    (project / "constraints.txt").write_text("# moved\n")
+    _kill_when_it_sets_up(project)
     (project / ".venv.old-1").symlink_to("/nowhere")
 
-    result = _start(project, "again")
-
-    assert result.stdout.endswith("|again\n"), result.stderr
-    assert not _leftovers(project)
-
-
-def test_changed_pins_set_up_anew_and_a_second_start_waits(project: Path) -> None:
-    (project / "constraints.txt").write_text("# moved\n")
     first = _background(project, "one")
-    deadline = time.monotonic() + 30
-    while not _leftovers(project) and time.monotonic() < deadline:
-        time.sleep(0.01)
+    _until_it_exists(project / f".venv.partial-{first.pid}")
     second = _background(project, "two")
+
     outputs = [process.communicate() for process in (first, second)]
     assert [output.split("|")[-1] for output, _ in outputs] == ["one\n", "two\n"]
     assert "setting up .venv" in outputs[0][1]
     assert "waiting" in outputs[1][1]
     assert "setting up .venv" not in outputs[1][1]
+    assert not _leftovers(project)
 
 
 def test_an_unfinished_test_set_up_is_done_anew(project: Path) -> None:
@@ -202,14 +225,6 @@ def test_an_unfinished_test_set_up_is_done_anew(project: Path) -> None:
     assert "setting up .venv" in result.stderr
     assert result.stdout == "tests\n"
     assert not (project / ".venv" / set_up.TESTS_UNFINISHED).exists()
-
-
-def test_an_environment_whose_interpreter_is_gone_is_made_anew(project: Path) -> None:
-    for link in (project / ".venv" / "bin").glob("python*"):
-        link.unlink()
-    result = _start(project, "z")
-    assert "setting up .venv" in result.stderr
-    assert result.stdout.endswith("|z\n")
 
 
 def test_a_failed_installation_ends_in_one_line_and_leaves_nothing(tmp_path: Path) -> None:

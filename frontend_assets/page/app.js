@@ -19,6 +19,7 @@ import { DRIVEN } from "/assets/robots.js";
 import { startScene } from "/assets/scene.js";
 import { Recording } from "/assets/recording.js";
 import { Replay } from "/assets/replay.js";
+import { ACTUATIONS } from "/assets/sensing.js";
 import { Settings } from "/assets/settings.js";
 import { StateStream } from "/assets/stream.js";
 import { startStylus } from "/assets/stylus.js";
@@ -121,12 +122,13 @@ function partFailed(name, error) {
 // What draws at its own pace, such as the plots, fails outside of every part.
 window.addEventListener("error", (event) => partFailed("drawing", event.message));
 
-function showLeader({ leader, engaged, plant, preset, seed }) {
+function showLeader({ leader, engaged, plant, preset, seed, actuation }) {
   setText(byId("leader"), LEADERS[leader] ?? leader);
   setText(byId("engaged"), engaged ? "· engaged" : "· not engaged");
   const robot = `${plant} robot${preset === null ? "" : `: ${preset}, seed ${seed}`}`;
+  const drive = actuation ? `, tendons driven by ${ACTUATIONS[actuation]}` : "";
   setText(byId("plant"), `· ${robot}`);
-  setData(byId("leader-words"), "tip", `Who leads the tip, and whether it follows. ${robot[0].toUpperCase()}${robot.slice(1)}`);
+  setData(byId("leader-words"), "tip", `Who leads the tip, and whether it follows. ${robot[0].toUpperCase()}${robot.slice(1)}${drive}`);
 }
 
 function onLink(change) {
@@ -156,7 +158,7 @@ byId("retry").addEventListener("click", () => stream.connect());
 
 startTooltips();
 startOperator();
-startScene();
+startScene(() => stream.driving && stream.send({ type: "let-go" }));
 startKeys({
   stop: () => motion.stop(),
   hold: (down) => motion.hold(down),

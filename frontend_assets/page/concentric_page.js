@@ -87,8 +87,8 @@ export function concentricPage() {
     choices: CHOICES,
     plots: PLOTS,
     tips: [
-      { key: "tip", title: "Tip of A, mm", read: (state, word) => state[word].position_mm },
-      { key: "tip-b", title: "Tip of B, mm", read: (state, word) => poseOfB[word](state) },
+      { key: "tip", title: "Tip of A, mm", read: (state, word) => state[word]?.position_mm },
+      { key: "tip-b", title: "Tip of B, mm", read: (state, word) => poseOfB[word]?.(state) },
     ],
     numbers: new ConcentricNumbers(),
     why: () => "",

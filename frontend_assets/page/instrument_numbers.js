@@ -1,7 +1,7 @@
-// The instrument's numbers: joints, servos, tendons, what each level of the priority leaves.
+// The instrument's numbers: joints, servos, what each level of the priority leaves.
 
 import { byId, make, setText } from "/assets/dom.js";
-import { figure, fixed } from "/assets/format.js";
+import { figure } from "/assets/format.js";
 import { barRow, plainRow, showBar, title } from "/assets/number_bars.js";
 
 const NEAR_DEG = 5;
@@ -26,10 +26,6 @@ export class InstrumentNumbers {
     const right = make("div");
     right.append(title("Servos", "deg"));
     this.servos = servos_deg.map((_, index) => right.appendChild(barRow(`S${index + 1}`, `servo-${index + 1}`)));
-    right.append(title("Tendons", "N"));
-    const tendons = right.appendChild(make("div", "tendons"));
-    tendons.dataset.tip = "Tension of tendons 1 to 4, at the servos";
-    this.tension = servos_deg.map((_, index) => tendons.appendChild(make("span", "", "–", { id: `tension-${index + 1}` })));
     right.append(title("Not met", "per level"));
     right.append(...RESIDUALS.map(([key, words]) => plainRow(words, `residual-${key}`, NOT_MET)));
     columns.replaceChildren(left, right);
@@ -43,7 +39,6 @@ export class InstrumentNumbers {
     state.joints_deg.forEach((value, index) => showBar(this.joints[index], value, state.joint_limits_deg[index], NEAR_DEG, "deg"));
     const range = this.servoRange_deg === null ? null : [-this.servoRange_deg, this.servoRange_deg];
     state.servos_deg.forEach((value, index) => showBar(this.servos[index], value, range, NEAR_DEG, "deg"));
-    state.tension_n.forEach((value, index) => setText(this.tension[index], fixed(value, 2)));
     for (const [key] of RESIDUALS) setText(byId(`residual-${key}`), figure(state.residuals[key]));
   }
 }

@@ -6,8 +6,10 @@ import { byId, setText, setUnusable } from "/assets/dom.js";
 import { figure, fine, fixed } from "/assets/format.js";
 import { InstrumentNumbers } from "/assets/instrument_numbers.js";
 import { ROBOT } from "/assets/robots.js";
+import { KnownForce, Sensing, trueForce } from "/assets/sensing.js";
 import { picked } from "/assets/settings.js";
 import { showTask } from "/assets/task.js";
+import { Tendons } from "/assets/tendons.js";
 import { Trocar } from "/assets/trocar.js";
 
 const withCase = () => ({ case: picked("case") });
@@ -19,8 +21,12 @@ const CHOICES = [
   { control: "list", id: "solver", where: "priority", key: "solver", beside: withCase, read: (state) => state.priority.solver },
   { control: "list", id: "coordinates", where: "priority", key: "coordinates", beside: withCase, read: (state) => state.priority.coordinates },
   { control: "list", id: "compensation", where: "compensation", key: "mode", read: (state) => state.compensation },
+  { control: "list", id: "tendon-control", where: "tendons", key: "control", read: (state) => state.tendons.control },
+  { control: "switch", id: "sensing", where: "sensing", key: "enabled", read: (state) => state.sensing.enabled },
   { control: "switch", id: "tracker", where: "compensation", key: "tracker", read: (state) => state.tracker.on },
 ];
+
+const known = new KnownForce();
 
 const PLOTS = [
   { key: "position", title: "Position error", unit: "mm", floor: 0.01, text: figure, lines: [{ key: "position", word: "source", read: (state) => state.errors.position_mm }] },
@@ -50,17 +56,38 @@ const PLOTS = [
     lines: [{ key: "bend", word: "commanded", read: (state) => state.bend_deg }],
     marks: ({ bend_limit_deg }) => [{ value: bend_limit_deg, label: `limit ${fixed(bend_limit_deg, 0)}°`, kind: "limit" }],
   },
+  {
+    key: "force",
+    title: "Contact force",
+    unit: "N",
+    floor: 0.1,
+    text: (value) => fixed(value, 3),
+    // Without tension cells nothing can be plotted; the group Sensing says so.
+    present: (state) => state.sensing.cells,
+    lines: [
+      { key: "force-estimated", label: "est.", word: "estimated", dashed: true, tip: "Estimated, along the directions in which it is observable", read: (state) => known.of(state)?.force_n ?? null },
+      { key: "force-true", label: "true", word: "true", tip: "True, of all contacts on the instrument together", read: (state) => trueForce(state) ?? undefined },
+    ],
+  },
 ];
+
+/** A robot without tension cells has no estimate of its tip. */
+function tipOf(state, word) {
+  if (word !== "estimated") return state[word].position_mm;
+  return state.sensing.cells ? state.sensing.tip.position_mm : undefined;
+}
 
 /** The instrument's share of the page. */
 export function instrumentPage() {
   const boards = new Boards();
   const trocar = new Trocar();
+  const sensing = new Sensing(known);
+  const tendons = new Tendons();
   const numbers = new InstrumentNumbers();
   return {
     choices: CHOICES,
     plots: PLOTS,
-    tips: [{ key: "tip", title: "Tip, mm", read: (state, word) => state[word].position_mm }],
+    tips: [{ key: "tip", title: "Tip, mm", read: tipOf }],
     numbers,
     why: (needed, state) => boards.why(needed, state.board),
     load: () => {
@@ -71,6 +98,8 @@ export function instrumentPage() {
       "instrument settings": () => showSettings(state, blocked),
       boards: () => boards.show(state, blocked, paths.needed),
       trocar: () => trocar.show(state, blocked),
+      sensing: () => sensing.show(state),
+      tendons: () => tendons.show(state, blocked),
       task: () => showTask(state),
     }),
   };

@@ -37,6 +37,7 @@ const ALL_KEYS = [
   { key: "b", robot: "instrument", show: "B", words: "Straighten and withdraw", press: ["withdraw"] },
   { key: "i", show: "I", words: "Devices: open or close", press: ["show-devices"] },
   { key: "j", show: "J", words: "Events: open or close", press: ["show-events"] },
+  { key: "y", robot: "instrument", show: "Y", words: "Sensing on or off", press: ["sensing"] },
   { key: "u", show: "U", words: "Choose the robot", open: "robot" },
   { key: "f", show: "F", words: "Freeze the plots", press: ["freeze"] },
   { key: "z", show: "Z", words: "Time window of the plots", other: "window" },

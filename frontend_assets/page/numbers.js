@@ -1,19 +1,20 @@
 // The numbers below the plots: where the tips are, active limits in words, and the robot's own.
 
-import { byId, make, setData, setText } from "/assets/dom.js";
+import { byId, make, setData, setHidden, setText } from "/assets/dom.js";
 import { fixed } from "/assets/format.js";
 import { title } from "/assets/number_bars.js";
 
 const WORDS = [
   ["desired", "Desired"],
   ["commanded", "Commanded"],
+  ["estimated", "Estimated"],
   ["true", "True"],
 ];
 
 export class Numbers {
   /**
-   * `tips`: {key, title, read(state, word)} of each tip that is shown; `own`: shows the robot's own
-   * numbers in two columns.
+   * `tips`: {key, title, read(state, word)} of each tip that is shown, undefined of a word that it
+   * does not have; `own`: shows the robot's own numbers in two columns.
    */
   constructor(tips, own) {
     this.tips = tips.map((tip) => ({ ...tip, rows: buildTip(tip) }));
@@ -48,12 +49,13 @@ function buildTip({ key, title: heading }) {
     const cell = make("th", "", "", { scope: "row" });
     const swatch = make("i", "swatch");
     swatch.dataset.word = word;
+    swatch.dataset.dashed = String(word === "estimated");
     const shown = make("span", "", name);
     cell.append(swatch, shown);
     row.append(cell);
     const cells = ["x", "y", "z"].map((axis) => make("td", "", "–", { id: `${key}-${word}-${axis}` }));
     row.append(...cells);
-    rows.set(word, { cells, shown, swatch });
+    rows.set(word, { row, cells, shown, swatch });
   }
   byId("numbers").append(table);
   return rows;
@@ -61,8 +63,9 @@ function buildTip({ key, title: heading }) {
 
 function showTip({ rows, read }, state) {
   for (const [word] of WORDS) {
-    const { cells, shown, swatch } = rows.get(word);
+    const { row, cells, shown, swatch } = rows.get(word);
     const position = read(state, word);
+    setHidden(row, position === undefined);
     cells.forEach((cell, axis) => setText(cell, position ? fixed(position[axis], 2) : "–"));
     if (word !== "true") continue;
     // On hardware nothing is true; the errors are then against what is measured.

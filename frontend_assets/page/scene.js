@@ -8,9 +8,12 @@ const ASK_MS = 400;
 
 const frame = () => byId("scene");
 
-/** Load the scene once the server has one to show. */
-export async function startScene() {
-  frame().addEventListener("load", followTheme);
+/** Load the scene once the server has one to show; `onRelease()` when a mouse button comes up in it. */
+export async function startScene(onRelease) {
+  frame().addEventListener("load", () => {
+    followTheme();
+    watchReleases(onRelease);
+  });
   onTheme(followTheme);
   for (;;) {
     const scene = await sceneWords();
@@ -37,6 +40,13 @@ function source() {
   if (ratio !== null) address += `&fixedDpr=${encodeURIComponent(ratio)}`;
   if (isDark()) address += "&darkMode";
   return address;
+}
+
+/** Before the scene hears of it, which may not know any more that it held a gizmo. */
+function watchReleases(onRelease) {
+  for (const end of ["pointerup", "pointercancel"]) {
+    sceneWindow()?.addEventListener(end, onRelease, { capture: true });
+  }
 }
 
 /** The window of the scene, or null while it cannot be reached. */

@@ -13,8 +13,10 @@ const CURSOR_KEYS = { ArrowLeft: -0.1, ArrowRight: 0.1 };
 export class Traces {
   /**
    * `plots`: key, title, unit, text(value), peak(low, high) where not the greatest, share (of the
-   * usual height), marks(state), and what a Plot takes. Of each line beside: read(state); bounds:
-   * [read, read]; tip. A line's word may be "source": that which errors are measured against.
+   * usual height), marks(state), present(state) where it is not always there, and what a Plot takes.
+   * Of each line beside: read(state); bounds: [read, read]; tip; label, its name where it has none at its
+   * end. A line's word may be "source": that
+   * which errors are measured against.
    */
   constructor(plots) {
     const lines = plots.flatMap((plot) => plot.lines);
@@ -52,7 +54,7 @@ export class Traces {
       const now = make("span", "plot-now", "–", { id: `now-${line.key}` });
       const reading = make("span", "plot-reading");
       if (single) title.prepend(swatch);
-      else reading.append(swatch, `${line.name} `);
+      else reading.append(swatch, `${line.label ?? line.name} `);
       reading.append(now);
       if (line.tip) reading.dataset.tip = line.tip;
       return { line: { ...line, bounded: line.bounds !== undefined }, swatch, now, reading };
@@ -64,7 +66,7 @@ export class Traces {
     root.append(head, canvas);
     byId("plots").append(root);
     this.#startCursor(canvas);
-    return { spec, lines, peak, canvas, plot: new Plot(canvas, spec) };
+    return { spec, root, lines, peak, canvas, plot: new Plot(canvas, spec) };
   }
 
   #startCursor(canvas) {
@@ -114,7 +116,7 @@ export class Traces {
     const back_s = this.cursor_s === null ? null : this.#end() - this.cursor_s;
     setText(byId("error-source"), back_s === null ? `desired − ${source}` : `at −${fixed(back_s, 1)} s`);
     const view = { history: this.frozen ?? this.live, end_s: this.#end(), window_s: this.window_s, cursor_s: this.cursor_s };
-    for (const { spec, lines, peak, plot } of this.views) {
+    for (const { spec, lines, peak, plot } of this.#shown()) {
       const present = lines.filter(({ line }) => line.read(this.state) !== undefined);
       const coloured = present.map(({ line }) => ({ ...line, word: line.word === "source" ? source : line.word }));
       plot.draw(view, coloured, spec.marks?.(this.state) ?? []);
@@ -125,6 +127,14 @@ export class Traces {
       }
     }
     drawTimeAxis(this.axis, this.window_s);
+  }
+
+  /** The plots that there are in the present state; the others are hidden. */
+  #shown() {
+    const shown = this.views.filter(({ spec }) => spec.present?.(this.state) ?? true);
+    for (const view of this.views) setHidden(view.root, !shown.includes(view));
+    byId("plots").style.setProperty("--plots", shown.length);
+    return shown;
   }
 
   /** The value now, or under the cursor, and the greatest (and least) of the window. */

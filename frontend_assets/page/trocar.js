@@ -1,9 +1,10 @@
 // The trocar: registered by touch or by numbers, its breathing, and the way out of it.
 
 import { call } from "/assets/api.js";
-import { byId, onPress, setBlocked, setText, setUnusable } from "/assets/dom.js";
+import { byId, onPress, setBlocked, setText } from "/assets/dom.js";
 import { fixed } from "/assets/format.js";
 import { attempt, refuse, tell } from "/assets/notices.js";
+import { numberIn, showNumber } from "/assets/number_field.js";
 import { ROBOT } from "/assets/robots.js";
 
 const AXES = ["x", "y", "z"];
@@ -25,7 +26,7 @@ export class Trocar {
       byId("trocar-enter").click();
     });
     for (const [id, key] of Object.entries(BREATHING)) {
-      byId(id).addEventListener("change", () => this.#breathe(key, byId(id).value));
+      byId(id).addEventListener("change", () => this.#breathe(key, numberIn(id)));
     }
     onPress(byId("withdraw"), () => this.#withdraw(), refuse);
   }
@@ -45,9 +46,8 @@ export class Trocar {
     else refuse(`The shaft does not go through this trocar (${where}). Insert it before you enable.`);
   }
 
-  async #breathe(key, words) {
-    const value = Number(words.trim().replace(",", "."));
-    if (words.trim() === "" || Number.isNaN(value)) refuse("Enter a number.");
+  async #breathe(key, value) {
+    if (Number.isNaN(value)) refuse("Enter a number.");
     else if (await attempt(call("PUT", `${ROBOT}/trocar/breathing`, { [key]: value }))) {
       tell("The trocar breathes like that with its next breath.");
     }
@@ -62,26 +62,12 @@ export class Trocar {
     const fault = safety.state === "FAULT" ? "Reset the fault first." : "";
     const why = blocked || moves || fault;
     for (const id of ["trocar-touch", "trocar-enter", "trocar-configured"]) setBlocked(byId(id), why);
-    AXES.forEach((axis, index) => this.#showNumber(`trocar-${axis}`, trocar_mm[index], 2, this.edited, blocked));
-    this.#showNumber("breathing-amplitude", trocar.breathing_amplitude_mm, 1, false, blocked);
-    this.#showNumber("breathing-period", trocar.breathing_period_s, 1, false, blocked);
+    AXES.forEach((axis, index) => showNumber(`trocar-${axis}`, trocar_mm[index], 2, this.edited, blocked));
+    showNumber("breathing-amplitude", trocar.breathing_amplitude_mm, 1, false, blocked);
+    showNumber("breathing-period", trocar.breathing_period_s, 1, false, blocked);
     const off = errors.rcm_mm === null ? "" : `, ${fixed(errors.rcm_mm, 2)} mm from the shaft`;
     setText(byId("trocar-words"), `${HOW[trocar.method]}${off}`);
     const asleep = safety.state === "ENABLED" ? "" : "Enable the robot first.";
     setBlocked(byId("withdraw"), blocked || asleep);
   }
-
-  /** What a person is typing, or has typed and not yet sent, stays. */
-  #showNumber(id, value, places, kept, blocked) {
-    const field = byId(id);
-    setUnusable(field, blocked);
-    if (kept || document.activeElement === field || value === null) return;
-    const words = value.toFixed(places);
-    if (field.value !== words) field.value = words;
-  }
-}
-
-function numberIn(id) {
-  const words = byId(id).value.trim().replace(",", ".").replace("\u2212", "-");
-  return words === "" ? NaN : Number(words);
 }

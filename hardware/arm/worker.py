@@ -228,7 +228,10 @@ class ArmWorker:
         elif self.stage == Stage.READY:
             state = self._session.state()
             if state not in READY_STATES:
-                self._fail("somebody else stopped the arm; reboot the devices to go on")
+                # An error may have come, and stopped it, between the two questions.
+                self.error, self.warning = self._session.codes()
+                words = "somebody else stopped the arm; reboot the devices to go on"
+                self._fail(error_message(self.error) if self.error else words)
             elif self.warning:
                 self._say(warning_message(self.warning))
 

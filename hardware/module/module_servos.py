@@ -33,8 +33,9 @@ from robot.configuration import Configuration
 from robot.records import SERVOS, Readiness
 from robot.safety import Event
 
-PATIENCE_S, _PATIENCE_PERIODS = 0.006, 1.5
-"""How late an answer may be. At 250 Hz two misses are found out within the 25 ms of the stylus."""
+PATIENCE_S, _PATIENCE_PERIODS = 0.004, 1.0
+"""How late an answer may be. At 250 Hz a miss ends after 8 ms, two of them within the limit of the
+bus: one period, two misses and two ticks."""
 _RESERVE = 1.3
 """How much faster than commands may be the goals may catch up."""
 _STATUS_EVERY_S = 0.05

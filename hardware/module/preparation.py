@@ -22,7 +22,7 @@ from hardware.servos.control_table import (
     HardwareError,
     OperatingMode,
 )
-from hardware.servos.errors import BusError
+from hardware.servos.errors import BusError, ServoSilent
 from hardware.servos.protocol import BROADCAST
 from robot.configuration import Servos
 
@@ -50,6 +50,7 @@ _TICKS_PER_LOAD = 0.001 * 128.0 * 885.0 / TABLE["position_p_gain"].initial
 
 _RELEASE_TIMES = 3
 _BOOT_S = 3.0
+_BOOT_TIMES = 3
 
 
 class ServoStatus(NamedTuple):
@@ -219,12 +220,22 @@ def reboot_all(bus: ServoBus, ids: Sequence[int]) -> None:
     Raises:
         BusError: if a servo does not come back.
     """
-    faulty = [servo for servo in ids if read_status(bus, servo).error]
     release_all(bus, ids)
-    for servo in faulty:
-        bus.reboot(servo)
+    for _ in range(_BOOT_TIMES):
+        faulty = [servo for servo in ids if read_status(bus, servo).error]
+        if not faulty:
+            break
+        for servo in faulty:
+            # An answer that was lost says nothing; whether it starts anew is seen below.
+            with contextlib.suppress(ServoSilent):
+                bus.reboot(servo)
+        _wait_for(bus, faulty)
+
+
+def _wait_for(bus: ServoBus, ids: Sequence[int]) -> None:
+    """Wait until servos that start anew answer; raises BusError where one does not."""
     deadline = time.monotonic() + _BOOT_S
-    for servo in faulty:
+    for servo in ids:
         while time.monotonic() < deadline:
             time.sleep(0.05)
             with contextlib.suppress(BusError):

@@ -42,10 +42,11 @@ DRIVES = np.dtype(
         ("anchor", "f8", 4),
         ("tension", "f8", 4),
         ("rest", "f8", 4),
+        ("torn", "i1", 4),
     ]
 )
 """State of the drives: what was commanded, where the references are, the servos' angles, where each
-tendon's stick spring is anchored, and the tension at the servos in N."""
+tendon's stick spring is anchored, the tension at the servos in N, and which tendons are torn."""
 
 
 @compiled
@@ -68,14 +69,33 @@ def drive_joints(drives: np.ndarray, constants: np.ndarray, q_rest: np.ndarray) 
 
 
 @compiled
-def drive_tendons(
+def turn_servos(drives: np.ndarray, constants: np.ndarray) -> None:
+    """Each servo follows its command with a lag, no faster than it can, and stops at whole ticks.
+
+    Args:
+        drives: (1,) changed.
+        constants: (1,).
+    """
+    d, c = drives[0], constants[0]
+    share = 1.0 - math.exp(-c.step_s / c.servo_lag_s)
+    fastest = c.servo_speed * c.step_s
+    for i in range(4):
+        moved = share * (d.servo_wanted[i] - d.servo_reference[i])
+        d.servo_reference[i] += min(max(moved, -fastest), fastest)
+        d.servo[i] = d.servo_reference[i]
+        if c.servo_tick > 0.0:
+            d.servo[i] = c.servo_tick * np.rint(d.servo_reference[i] / c.servo_tick)
+
+
+@compiled
+def hold_tendons(
     drives: np.ndarray,
     constants: np.ndarray,
     length: np.ndarray,
     stiffness: np.ndarray,
     rest_length: np.ndarray,
 ) -> None:
-    """Servos turn, and stretch and friction of the tendons become one pull-only spring each.
+    """Stretch and friction of the tendons become one pull-only spring each, as the servos stand.
 
     A tendon that sticks in the disks is held by a second spring to where it last slid; at the
     Coulomb limit its anchor slides along. So friction holds without creeping.
@@ -88,16 +108,14 @@ def drive_tendons(
         rest_length: (4,) filled, m.
     """
     d, c = drives[0], constants[0]
-    share = 1.0 - math.exp(-c.step_s / c.servo_lag_s)
-    fastest = c.servo_speed * c.step_s
     for i in range(4):
-        moved = share * (d.servo_wanted[i] - d.servo_reference[i])
-        d.servo_reference[i] += min(max(moved, -fastest), fastest)
-        d.servo[i] = d.servo_reference[i]
-        if c.servo_tick > 0.0:
-            d.servo[i] = c.servo_tick * np.rint(d.servo_reference[i] / c.servo_tick)
         slack = c.pretension[i] / c.tendon_stiffness[i]
         rest = c.tendon_length[i] + c.pulley_radius * d.servo[i] - slack
+        d.rest[i] = rest
+        if d.torn[i] != 0:
+            d.tension[i], d.anchor[i] = 0.0, length[i]
+            stiffness[i], rest_length[i] = 0.0, rest
+            continue
         stretch = length[i] - rest
         d.tension[i] = max(0.0, c.tendon_stiffness[i] * stretch)
         # No more friction than tension presses the tendon onto the disks.

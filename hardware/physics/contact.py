@@ -65,6 +65,8 @@ class ContactWatch:
     Attributes:
         count: contacts of the instrument in the last tick.
         force_n: largest of their forces, N.
+        wrench: (6,) of all of them together on the instrument: force in N, moment about the tip in
+            N m, base frame.
         touched: bits of the rings that the instrument has touched.
         passed: bits of the rings that the tip has gone half-way through.
         ball_progress: share of the groove that the ball has covered.
@@ -76,7 +78,7 @@ class ContactWatch:
         self.touched, self.passed = 0, 0
         self.ball_progress, self.ball_position = 0.0, np.zeros(3)
         self._physics = physics
-        self._force = np.zeros(6)
+        self._force, self.wrench = np.zeros(6), np.zeros(6)
         self._first, self._last = physics.instrument_geoms
         self._ring_of = {
             int(physics.board_geoms[solid]): index
@@ -100,8 +102,9 @@ class ContactWatch:
             tip: (3,) m, base frame.
         """
         self.count, self.force_n = 0, 0.0
+        self.wrench[:] = 0.0
         for index in range(data.ncon):
-            self._contact(data, index)
+            self._contact(data, index, tip)
         if self._centres.size:
             self.passed |= _rings_passed(tip, self._centres, self._axes, self._radii, self._before)
         place = self._physics.ball_position
@@ -109,7 +112,7 @@ class ContactWatch:
             self.ball_position[:] = data.qpos[place : place + 3]
             self.ball_progress = _progress(self.ball_position, self._line, self._lengths)
 
-    def _contact(self, data: Any, index: int) -> None:
+    def _contact(self, data: Any, index: int, tip: np.ndarray) -> None:
         one, other = data.contact.geom[index]
         instrument = self._first <= one <= self._last
         if not instrument and not self._first <= other <= self._last:
@@ -120,6 +123,11 @@ class ContactWatch:
             return
         self.count += 1
         self.force_n = max(self.force_n, force)
+        # The engine tells the force on the second of the two, in the contact's own frame.
+        on_second = data.contact.frame[index].reshape(3, 3).T @ self._force[:3]
+        on_instrument = -on_second if instrument else on_second
+        self.wrench[:3] += on_instrument
+        self.wrench[3:] += np.cross(data.contact.pos[index] - tip, on_instrument)
         ring = self._ring_of.get(int(other if instrument else one))
         if ring is not None:
             self.touched |= 1 << ring

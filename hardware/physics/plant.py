@@ -10,29 +10,35 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from hardware.physics.actuation import ACTUATION, DRIVES, drive_joints, drive_tendons
+from hardware.physics.actuation import ACTUATION, DRIVES, drive_joints, hold_tendons
 from hardware.physics.contact import ContactWatch
 from hardware.physics.model import SPEED_DAMPING_S, STEP_S, build
 from hardware.physics.preset import PRESETS, draw
+from hardware.physics.tendon_drive import ServoDrive, TendonDrive, UnitDrive
 from hardware.physics.tracker import TipTracker
 from hardware.plant import Actuator, Measurement, PlantSpec
+from hardware.tension_unit.module import UnitFault
 from hardware.wireless import Wireless
 from robot.configuration import Configuration
 from robot.records import ARM_JOINTS, SERVOS
 from robot.rotations import quaternion_from_matrix
 from robot.safety import Event
 from robot.tendons import servo_angles
+from robot.tension.records import TendonMode
 from scenes.boards.board import Board
 
 SERVO_STALL_NM = 1.4
 """Largest torque of an XL430-W250 at 11.1 V, after its maker's data sheet."""
 
+_POSITIONS, _NO_TENSIONS = np.full(SERVOS, TendonMode.POSITION), np.zeros(SERVOS)
 NO_BOARD = Board("none", "No board")
 _EXERCISE_RAD = 0.2
 _EXERCISE_SHRINKS = 0.75
 _EXERCISES = 16
 _EXERCISE_S = 0.12
 _SETTLE_S = 0.4
+_HAND_N = 20.0
+"""What whoever ties a tendon pulls it with, at most."""
 
 
 def _warn(text: str) -> None:
@@ -67,7 +73,7 @@ class PhysicsPlant(Wireless):
         simulation = configuration.simulation
         self._configuration = configuration
         self._preset = PRESETS[simulation.preset]
-        robot, noise = np.random.default_rng(simulation.seed).spawn(2)
+        robot, noise, cells = np.random.default_rng(simulation.seed).spawn(3)
         self._drawn = draw(self._preset, robot)
         joints = tuple(Actuator(joint.name, "rad") for joint in configuration.arm.joints)
         servos = tuple(Actuator(f"servo{index}", "rad") for index in range(1, SERVOS + 1))
@@ -81,11 +87,16 @@ class PhysicsPlant(Wireless):
         self._q_rest, self._rest = np.empty(ARM_JOINTS), np.empty(SERVOS)
         self._trocar_offset = np.zeros(3)
         self._servo, self._tension = np.zeros(SERVOS), np.zeros(SERVOS)
-        self._load = np.zeros(SERVOS)
+        self._load, self._true_tension = np.zeros(SERVOS), np.zeros(SERVOS)
         self._load_per_tension = configuration.module.pulley_radius_m / SERVO_STALL_NM
         self._q = np.zeros(ARM_JOINTS)
         self._assemble(NO_BOARD)
         self._constants = self._actuation()
+        self._unit: UnitDrive | None = None
+        self._untied = np.zeros(SERVOS, dtype=bool)
+        self._tendon_drive: TendonDrive = ServoDrive(self._constants)
+        if simulation.actuation == "tension-unit":
+            self._unit = self._tendon_drive = UnitDrive(configuration, self._constants, cells)
         self._wake(x)
         self._tracker = TipTracker(configuration.tracker, noise)
         # Only now, so that nothing stands in the way of a segment that comes from straight.
@@ -106,7 +117,7 @@ class PhysicsPlant(Wireless):
         self._arm = slice(int(self._physics.arm_positions[0]), ARM_JOINTS)
         self._rest_angles = model.qpos_spring[self._arm]
         self._stiffness, self._springs = model.tendon_stiffness, model.tendon_lengthspring[:, 1]
-        self._length = data.ten_length
+        self._length, self._lengthening = data.ten_length, data.ten_velocity
         mujoco.mj_forward(model, data)
         self._standing = data.qpos.copy()
         self._watch = ContactWatch(self._physics, board)
@@ -165,7 +176,8 @@ class PhysicsPlant(Wireless):
         drives = self._drives
         drive_joints(drives, self._constants, self._q_rest)
         self._rest_angles[:] = self._q_rest
-        drive_tendons(drives, self._constants, self._length, self._stiffness, self._rest)
+        self._tendon_drive.turn(drives, self._length)
+        hold_tendons(drives, self._constants, self._length, self._stiffness, self._rest)
         self._springs[:] = self._rest
         if self._released:
             self._springs[:] = 1.0
@@ -175,9 +187,16 @@ class PhysicsPlant(Wireless):
         mujoco.mj_kinematics(self._model, self._data)
         self._standing[:] = self._data.qpos
         self._q[:] = self._data.qpos[self._arm]
-        self._servo[:] = self._drives["servo"][0]
-        self._tension[:] = self._drives["tension"][0]
+        # The engine's springs act implicitly, on lengths within the step; what it tells is those
+        # at the step's beginning.
+        drives, constants = self._drives, self._constants
+        midway = self._length + 0.5 * self._model.opt.timestep * self._lengthening
+        stretch = midway - drives["rest"][0]
+        np.maximum(constants["tendon_stiffness"][0] * stretch, 0.0, out=self._tension)
+        np.copyto(self._tension, 0.0, where=drives["torn"][0] != 0)
         np.multiply(self._tension, self._load_per_tension, out=self._load)
+        self._true_tension[:] = self._tension
+        self._tendon_drive.measure(drives, self._servo, self._tension)
         self._tracker.look(self._time_ns, self._tip, self._tip_rotation)
         self._watch.look(self._data, self._tip)
         self._measurement = Measurement(
@@ -186,6 +205,7 @@ class PhysicsPlant(Wireless):
             self._tension,
             self._tracker.newest,
             self._load,
+            tension_cells=self._tendon_drive.measures_tension,
             contact_n=self._watch.force_n,
             event=int(Event.SIMULATION_FAILED) if self._failed else 0,
         )
@@ -198,10 +218,12 @@ class PhysicsPlant(Wireless):
         """Take the command; servos and joints follow it with their lags."""
         self._drives["q_wanted"] = command["q"]
         self._drives["servo_wanted"] = command["servo"]
+        self._tendon_drive.take(command["tendon_mode"][0], command["tension"][0])
 
     def advance(self) -> int:
         """Let one tick pass. A simulation that breaks down stands still from then on."""
         if not self._failed:
+            self._tie()
             before = self._data.time
             for _ in range(self._steps):
                 self._step()
@@ -223,6 +245,7 @@ class PhysicsPlant(Wireless):
         """Stay where it is, under torque."""
         self._drives["q_wanted"] = self._drives["q_reference"]
         self._drives["servo_wanted"] = self._drives["servo_reference"]
+        self._tendon_drive.take(_POSITIONS, _NO_TENSIONS)
         self._released = False
 
     def release(self) -> None:
@@ -231,6 +254,30 @@ class PhysicsPlant(Wireless):
         :meth:`hold` takes hold again.
         """
         self._released = True
+
+    def break_module(self, module: int, fault: UnitFault) -> None:
+        """Break ``module`` (0 to 3) of the tension-feedback unit from the next tick on.
+
+        ``UnitFault.NONE`` mends it; without such a unit there is nothing to break. A torn tendon
+        is tied again as soon as a hand can: once its pulley has come back so far.
+        """
+        if self._unit is None:
+            return
+        torn = bool(self._drives["torn"][0, module])
+        self._untied[module] = torn and fault == UnitFault.NONE
+        if not self._untied[module]:
+            self._drives["torn"][0, module] = fault == UnitFault.TENDON_BROKEN
+            self._unit.break_module(module, fault)
+
+    def _tie(self) -> None:
+        """Tie again what is mended, where the tendon then carries no more than a hand can pull."""
+        if self._unit is None or not self._untied.any():
+            return
+        constants, drives = self._constants[0], self._drives[0]
+        pull = constants["tendon_stiffness"] * (self._length - drives["rest"])
+        for module in np.flatnonzero(self._untied & (pull <= _HAND_N)):
+            drives["torn"][module], self._untied[module] = False, False
+            self._unit.break_module(int(module), UnitFault.NONE)
 
     def close(self) -> None:
         """There are no devices to give back."""
@@ -284,9 +331,10 @@ class PhysicsPlant(Wireless):
         t["q"] = self._q
         t["uv"] = self._data.qpos[bends].sum(axis=0)
         t["trocar_position"] += self._trocar_offset
-        t["tension"] = self._tension
+        t["tension"] = self._true_tension
         watch = self._watch
         t["contact_count"], t["contact_force"] = watch.count, watch.force_n
+        t["contact_wrench"] = watch.wrench
         t["rings_passed"], t["rings_touched"] = watch.passed, watch.touched
         t["ball_position"], t["ball_progress"] = watch.ball_position, watch.ball_progress
         return True

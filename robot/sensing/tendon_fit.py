@@ -124,3 +124,24 @@ def fit(told: np.ndarray, seen_at: np.ndarray, seen: np.ndarray, chord: float) -
     gain, offset, friction, stick = found.x.reshape(4, 2).tolist()
     rest = np.sqrt(np.mean(left(found.x).reshape(2, -1) ** 2, axis=1)).tolist()
     return [AxisFit(gain[k], offset[k], friction[k], stick[k], rest[k]) for k in range(2)]
+
+
+def sliding_shares(told: np.ndarray, fits: list[AxisFit], chord: float) -> np.ndarray:
+    """How the tendons slid in a sweep, as the fits have it: (n, 4), 1 toward the pulley.
+
+    Args:
+        told: (n, 2) as in :func:`fit`.
+        fits: of u and of v.
+        chord: as in :func:`fit`.
+    """
+    gain, offset, friction, stick = np.array([fit[:4] for fit in fits]).T.copy()
+    bends, shares = np.empty_like(told), np.zeros((len(told), 4))
+    _predict(told, gain, offset, friction, stick, chord, bends)
+    slid, share = np.empty(4), np.zeros(4)
+    for row in range(1, len(told)):
+        (u_before, v_before), (u, v) = bends[row - 1], bends[row]
+        tendon_motion(u_before, v_before, u, v, chord, slid)
+        for i in range(4):
+            share[i] = friction_after(share[i], slid[i], fits[i % 2].stick)
+        shares[row] = -share
+    return shares

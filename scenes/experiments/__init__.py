@@ -12,6 +12,7 @@ from robot.configuration import Configuration
 from robot.errors import UnknownName
 from scenes.experiments.bending import BENDING_S, arc, arc_stylus
 from scenes.experiments.planar import circle, circle_infeasible, square
+from scenes.experiments.pressing import press_times, ring_press
 from scenes.experiments.pushing import silicon_arc, silicon_sine
 from scenes.experiments.rings import half_way_times, ring_path
 from scenes.path import Path
@@ -103,6 +104,13 @@ _EXPERIMENTS = {
     ),
     "ring-board": _Plan(
         "half-way through six rings, 12 s a ring", ring_path, "ring-board", marks=half_way_times
+    ),
+    "ring-press": _Plan(
+        "against the side of a ring, five levels of force, 4 s a level",
+        ring_press,
+        "ring-board",
+        cases=("1",),
+        marks=press_times,
     ),
 }
 

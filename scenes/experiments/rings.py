@@ -14,7 +14,8 @@ RING_S = 12.0
 """For each ring."""
 
 _APPROACH_S, _IN_S, _REST_S, _OUT_S = 5.0, 3.0, 1.0, 3.0
-_STANDOFF_M = 0.010
+STANDOFF_M = 0.010
+"""Of the tip before a ring, on its axis, m."""
 _BEYOND_M = 0.003
 """The tip's foremost point goes this far past the ring's plane: its full width stands in it."""
 
@@ -25,7 +26,7 @@ def half_way_times(configuration: Configuration) -> tuple[float, ...]:
     return tuple(index * RING_S + middle for index in range(len(ring_board(configuration).rings)))
 
 
-def _pointing(start: np.ndarray, axis: np.ndarray) -> Rotation:
+def pointing(start: np.ndarray, axis: np.ndarray) -> Rotation:
     """The shortest turn that takes the unit vector ``start`` to ``axis``."""
     cross = np.cross(start, axis)
     sine = float(np.linalg.norm(cross))
@@ -43,15 +44,15 @@ def ring_path(configuration: Configuration) -> np.ndarray:
     for index, ring in enumerate(rings):
         now = (instants >= index * RING_S) & (instants <= (index + 1) * RING_S)
         local = instants[now] - index * RING_S
-        goal = ring.centre - _STANDOFF_M * ring.axis - here.tip
-        pointing = _pointing(here.tip_rotation[:, 2], ring.axis)
+        goal = ring.centre - STANDOFF_M * ring.axis - here.tip
+        turned = pointing(here.tip_rotation[:, 2], ring.axis)
         approach = minimum_jerk(local / _APPROACH_S)
         inward = minimum_jerk((local - _APPROACH_S) / _IN_S)
         outward = minimum_jerk((local - (RING_S - _OUT_S)) / _OUT_S)
-        depth = (_STANDOFF_M + _BEYOND_M) * (inward - outward)
+        depth = (STANDOFF_M + _BEYOND_M) * (inward - outward)
         samples[now, 1:4] = position + approach[:, None] * (goal - position)
         samples[now, 1:4] += depth[:, None] * ring.axis
-        turning = Slerp([0.0, 1.0], Rotation.concatenate([turn, pointing]))
+        turning = Slerp([0.0, 1.0], Rotation.concatenate([turn, turned]))
         samples[now, 4:8] = turning(approach).as_quat()[:, [3, 0, 1, 2]]
-        position, turn = goal, pointing
+        position, turn = goal, turned
     return samples

@@ -6,6 +6,7 @@ import hashlib
 import os
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import hardware.physics
 from robot.calibration import Calibration, CalibrationRefused, parse_calibration
@@ -72,14 +73,9 @@ def load_if_there(path: Path) -> Calibration | None:
         return None
 
 
-def save(path: Path, calibration: Calibration) -> None:
-    """Write a calibration, in one piece.
-
-    Raises:
-        CalibrationFileError: it cannot be written.
-    """
-    lines = ["# What a bending sweep found about the tendons. Written by 'keyhole calibrate'."]
-    for name, value in calibration.model_dump().items():
+def _table(values: dict[str, Any]) -> list[str]:
+    lines = []
+    for name, value in values.items():
         if isinstance(value, str):
             shown = '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
         elif isinstance(value, tuple):
@@ -87,6 +83,19 @@ def save(path: Path, calibration: Calibration) -> None:
         else:
             shown = repr(value)
         lines.append(f"{name} = {shown}")
+    return lines
+
+
+def save(path: Path, calibration: Calibration) -> None:
+    """Write a calibration, in one piece.
+
+    Raises:
+        CalibrationFileError: it cannot be written.
+    """
+    lines = ["# What a bending sweep found about the tendons. Written by 'keyhole calibrate'."]
+    lines += _table(calibration.model_dump(exclude={"tendons"}))
+    if calibration.tendons:
+        lines += ["", "[tendons]", *_table(calibration.tendons.model_dump())]
     unfinished = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -12,14 +12,16 @@ import numpy as np
 from hardware.choose import simulated_plant
 from hardware.plant import Plant
 from robot.arm import Arm
-from robot.calibration import Calibration
+from robot.calibration import Calibration, TendonCalibration
 from robot.configuration import Configuration
 from robot.instrument_robot import InstrumentRobot
 from robot.parameters import chord_ratio, parameters
-from robot.records import COMMAND
+from robot.records import COMMAND, SERVOS
 from robot.rotations import matrix_from_quaternion
-from robot.sensing.tendon_fit import SweepTooPoor, bend_of, fit
-from robot.tendons import bend_from_servos, servo_angles
+from robot.sensing.parameters import chord_length
+from robot.sensing.sweep_calibration import fit_stretch, fit_sweep
+from robot.sensing.tendon_fit import AxisFit, SweepTooPoor, bend_of, fit, sliding_shares
+from robot.tendons import bend_from_servos, servo_angles, tendon_lengths
 from robot.urdf import urdf_text
 
 _SPEED_RAD_S = math.radians(40.0)
@@ -35,11 +37,13 @@ class Sweep:
         told: (n, 2) the servos' positions as bend (u, v), every tick, rad.
         seen_at: (m,) ticks at which the tracker saw the tip.
         seen: (m, 2) the bend that it saw, rad.
+        tensions: (n, 4) of the tendons, every tick, N; None where nothing measures them.
     """
 
     told: np.ndarray
     seen_at: np.ndarray
     seen: np.ndarray
+    tensions: np.ndarray | None
 
 
 def sweep_bends(bend_limit: float, start: np.ndarray, dt_s: float) -> np.ndarray:
@@ -85,6 +89,7 @@ def sweep(plant: Plant, configuration: Configuration, progress: Callable[[float]
     start = np.array(bend_from_servos(plant.read().servo, pitch, pulley))
     bends = sweep_bends(float(p["bend_max"]), start, dt_s * 1e-9)
     told, seen_at, axes, newest = np.empty_like(bends), [], [], 0
+    tensions = np.empty((len(bends), SERVOS))
     for tick, (u, v) in enumerate(bends):
         servo_angles(u, v, pitch, pulley, command["servo"][0])
         command["moving"] = 1
@@ -94,6 +99,7 @@ def sweep(plant: Plant, configuration: Configuration, progress: Callable[[float]
         if measurement.event or not measurement.valid:
             raise SweepTooPoor("the robot stopped answering during the sweep; start again")
         told[tick] = bend_from_servos(measurement.servo, pitch, pulley)
+        tensions[tick] = measurement.tension
         sample = measurement.tracker
         then = tick - round(float(sample["age_s"]) * 1e9 / dt_s)
         if sample["sequence"] > newest and then >= 0:
@@ -106,7 +112,46 @@ def sweep(plant: Plant, configuration: Configuration, progress: Callable[[float]
             progress(tick / len(bends))
     if not axes:
         raise SweepTooPoor("no tracker saw the tip; a calibration needs one")
-    return Sweep(told, np.array(seen_at), bend_of(np.array(axes)))
+    measured = tensions if plant.read().tension_cells else None
+    return Sweep(told, np.array(seen_at), bend_of(np.array(axes)), measured)
+
+
+def tendon_calibration(
+    found: Sweep, fits: list[AxisFit], configuration: Configuration
+) -> TendonCalibration | None:
+    """Stiffness and friction from the tensions of a sweep; None where nothing measured them.
+
+    Raises:
+        SweepUnusable: the tensions do not show them.
+    """
+    if found.tensions is None:
+        return None
+    p = parameters(configuration)[0]
+    pitch, pulley = float(p["pitch_radius"]), float(p["pulley_radius"])
+    instrument, sensing = configuration.instrument, configuration.sensing
+    chord = chord_length(instrument)
+    shares = sliding_shares(found.told, fits, float(p["chord"]))[found.seen_at]
+    lengths, taken_up = np.empty((2, len(found.seen), SERVOS))
+    for row, (at, (u, v)) in enumerate(zip(found.seen_at, found.seen, strict=True)):
+        tendon_lengths(u, v, pitch, lengths[row])
+        lengths[row] -= chord * (u * u + v * v)
+        servo_angles(found.told[at, 0], found.told[at, 1], pitch, pulley, taken_up[row])
+    tensions = found.tensions[found.seen_at]
+    stiffness, pretension = fit_stretch(pulley * taken_up, lengths, tensions)
+    fitted = fit_sweep(
+        tensions, lengths, shares, (pitch, instrument.segment_length_m, chord),
+        sensing.bending_stiffness_n_m2,
+    )  # fmt: skip
+    return TendonCalibration(
+        bending_stiffness_n_m2=fitted.stiffness,
+        stiffness_uncertainty=fitted.stiffness_deviation,
+        friction=fitted.friction,
+        friction_n=fitted.coulomb,
+        friction_uncertainty=fitted.friction_deviation,
+        tendon_stiffness_n_m=stiffness,
+        pretension_n=tuple(pretension.tolist()),
+        residual_mm=fitted.residual * 1e3,
+    )
 
 
 def calibrate(
@@ -116,6 +161,7 @@ def calibrate(
 
     Raises:
         SweepTooPoor: the sweep does not show what is needed.
+        SweepUnusable: nor do its tensions.
     """
     free = configuration.simulation.model_copy(update={"board": "none"})
     configuration = configuration.model_copy(update={"simulation": free})
@@ -134,6 +180,7 @@ def calibrate(
         stick_rad=(fits[0].stick, fits[1].stick),
         residual_deg=math.degrees(max(fit.residual for fit in fits)),
         samples=len(found.seen),
+        tendons=tendon_calibration(found, fits, configuration),
         robot=robot_name(configuration),
         configuration_hash=f"{configuration.hash64():016x}",
         made=datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M:%S UTC"),
@@ -154,7 +201,7 @@ def calibration_for(
     if configuration.compensation.mode == "off" or simulation.plant == "kinematic":
         return Calibration()
     free = simulation.model_copy(update={"board": "none"})
-    same = {"simulation": free, "priority": None, "compensation": None}
+    same = {"simulation": free, "priority": None, "compensation": None, "tendons": None}
     key = configuration.model_copy(update=same).model_dump_json(warnings=False)
     if key not in _KNOWN:
         _KNOWN[key] = calibrate(configuration, progress)
@@ -168,4 +215,5 @@ def robot_name(configuration: Configuration) -> str:
     simulation = configuration.simulation
     if simulation.plant == "kinematic":
         return "kinematic"
-    return f"{simulation.plant}, preset {simulation.preset}, seed {simulation.seed}"
+    unit = ", tension unit" if simulation.actuation == "tension-unit" else ""
+    return f"{simulation.plant}, preset {simulation.preset}, seed {simulation.seed}{unit}"

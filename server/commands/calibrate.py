@@ -13,7 +13,7 @@ from server.calibration.sweep import calibrate
 from server.commands.progress_bar import ProgressBar
 from server.commands.run import seed
 from server.configuration_file import load
-from server.run.options import PLANTS, PRESETS
+from server.run.options import ACTUATIONS, PLANTS, PRESETS
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -24,6 +24,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--plant", choices=PLANTS, help="the robot")
     parser.add_argument("--preset", choices=PRESETS, help="how good the simulated robot is")
     parser.add_argument("--seed", type=seed, metavar="N", help="which robot of the preset")
+    parser.add_argument("--actuation", choices=ACTUATIONS, help="what drives the tendons")
     parser.add_argument("--config", metavar="FILE", help="configuration (TOML)")
     parser.add_argument(
         "--out",
@@ -43,7 +44,7 @@ def execute(arguments: argparse.Namespace) -> int:
     configuration = load(arguments.config)
     chosen = {
         name: getattr(arguments, name)
-        for name in ("plant", "preset", "seed")
+        for name in ("plant", "preset", "seed", "actuation")
         if getattr(arguments, name) is not None
     }
     table = configuration.simulation.model_dump() | chosen
@@ -69,5 +70,13 @@ def _print(found: Calibration, path: Path) -> None:
             f"offset {math.degrees(found.offset_rad[k]):+.2f} deg   "
             f"friction {math.degrees(found.friction_rad[k]):.2f} deg   "
             f"sticks over {math.degrees(found.stick_rad[k]):.2f} deg"
+        )
+    if found.tendons:
+        t = found.tendons
+        print(
+            f"  backbone: E I {t.bending_stiffness_n_m2 * 1e6:.1f} N mm^2 "
+            f"(+- {100 * t.stiffness_uncertainty:.1f} %)   tendons: friction {t.friction_n:.2f} N "
+            f"and {t.friction:.3f} per rad (+- {100 * t.friction_uncertainty:.0f} %), "
+            f"{t.tendon_stiffness_n_m * 1e-3:.2f} N/mm, {t.residual_mm * 1e3:.0f} um rms left"
         )
     print(f"written to {path}")

@@ -15,6 +15,7 @@ from robot.concentric.design import METHODS
 from robot.configuration import Compensation, Configuration, Hardware, Simulation
 from robot.errors import UnknownName
 from robot.section import Section
+from robot.tension.design import Tendons
 from server.version import version
 
 ROBOTS = ("instrument", "concentric", "hardware")
@@ -22,18 +23,26 @@ ROBOTS = ("instrument", "concentric", "hardware")
 
 ARMS = get_args(Hardware.model_fields["arm"].annotation)
 
-_SECTIONS: dict[str, type[Section]] = {"simulation": Simulation, "compensation": Compensation}
+_SECTIONS: dict[str, type[Section]] = {
+    "simulation": Simulation,
+    "compensation": Compensation,
+    "tendons": Tendons,
+}
 _SIMULATED = {
     "plant": ("simulation", "plant"),
     "preset": ("simulation", "preset"),
+    "actuation": ("simulation", "actuation"),
     "board": ("simulation", "board"),
     "compensation": ("compensation", "mode"),
+    "tendons": ("tendons", "control"),
 }
 _HELP = {
     "plant": "the robot",
     "preset": "how good the simulated robot is",
+    "actuation": "what drives the tendons of the simulated robot",
     "board": "what stands before the instrument",
     "compensation": "how stretch and friction of the tendons are met",
+    "tendons": "what the drives of the tendons hold",
 }
 
 
@@ -97,7 +106,7 @@ def _seed(text: str) -> int:
 
 def configured(configuration: Configuration, arguments: argparse.Namespace) -> Configuration:
     """The configuration with what the command line chooses in its place."""
-    chosen: dict[str, dict[str, object]] = {"simulation": {}, "compensation": {}, "tracker": {}}
+    chosen: dict[str, dict[str, object]] = {name: {} for name in (*_SECTIONS, "tracker")}
     for flag, (table, key) in _SIMULATED.items():
         if getattr(arguments, flag) is not None:
             chosen[table][key] = getattr(arguments, flag)
@@ -150,11 +159,13 @@ def execute(arguments: argparse.Namespace) -> int:
     Raises:
         KeyholeError: something stands against the start; nothing was started.
     """
+    from robot.tension.feasibility import check_configured
     from server.configuration_file import load
 
     configuration = load(arguments.config)
     _check_robot(arguments, configuration)
     chosen = configured(configuration, arguments)
+    check_configured(chosen)
     return serve(arguments, chosen, record=_recording_path(arguments.record))
 
 

@@ -1,4 +1,4 @@
-"""``keyhole report``: all of both papers' experiments, and one page about them."""
+"""``keyhole report``: the experiments of all three papers, and one page about them."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from server.commands.stop_signals import StopSignals
 from server.commands.study import add_worker_arguments, calibration_text, seeds
 from server.configuration_file import load
 from server.report.results import Results, tasks
+from server.report.sensing_results import SensingResults
+from server.report.sensing_tasks import sensing_csv, sensing_tasks
 from server.report.tube_measures import measure_tubes
 from server.report.tube_results import TubeResults
 from server.report.tube_tasks import tube_csv, tube_tasks
@@ -29,8 +31,8 @@ from server.study.task import Task
 from server.version import version
 
 PAGE = "report.html"
-ROBOTS = ("instrument", "concentric")
-_TUBES = "tubes"
+PARTS = ("instrument", "concentric", "sensing")
+_TUBES, _SENSING = "tubes", "sensing"
 _PRESET = "paper"
 _INSTRUMENT_OPTIONS = ("seeds", "preset", "plant", "calibration")
 _SEEDS = [1, 2, 3, 4, 5]
@@ -42,7 +44,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Add ``report`` to the command line."""
     parser = subparsers.add_parser("report", help="run the papers' experiments, write one page")
     parser.add_argument("--out", metavar="DIR", required=True, help=f"folder of runs and {PAGE}")
-    parser.add_argument("--robot", choices=ROBOTS, help="the part of one robot only")
+    parser.add_argument("--robot", choices=PARTS, help="one part only: of a robot, or sensing")
     parser.add_argument("--seeds", metavar="LIST", type=seeds, help="of the instrument (1-5)")
     parser.add_argument("--preset", choices=PRESETS, help="how good the instrument is (paper)")
     parser.add_argument("--plant", choices=PLANTS, help="how the instrument is simulated (physics)")
@@ -63,23 +65,32 @@ def execute(arguments: argparse.Namespace) -> int:
         refuse_options(
             arguments, _INSTRUMENT_OPTIONS, "the concentric-tube arms have no such thing"
         )
+    if arguments.robot == "sensing":
+        refuse_options(arguments, _INSTRUMENT_OPTIONS, "the sensing experiments have no such thing")
     configuration = load(arguments.config)
     folder = StudyFolder(Path(arguments.out))
     chosen = arguments.seeds or (_SEEDS[:1] if arguments.quick else _SEEDS)
-    instrument = tubes = None
+    wanted = PARTS if arguments.robot is None else (arguments.robot,)
+    instrument = tubes = sensing = None
     factor = None
     with StopSignals() as stopped:
-        if arguments.robot != "concentric":
+        if "instrument" in wanted:
             instrument = _run_instrument(arguments, configuration, folder, chosen, stopped.received)
             if instrument.stopped:
                 return _stopped(instrument)
             factor = _speed(configuration, arguments)
-        if arguments.robot != "instrument":
+        if "concentric" in wanted:
             tubes = _run_tubes(arguments, configuration, folder, stopped.received)
             if tubes.study.stopped:
                 return _stopped(tubes.study)
-    failures = _failures(instrument) + _failures(None if tubes is None else tubes.study)
-    _write(arguments, configuration, folder, chosen, factor, failures, instrument, tubes)
+        if "sensing" in wanted:
+            sensing = _run_sensing(arguments, configuration, folder, stopped.received)
+            if sensing.study.stopped:
+                return _stopped(sensing.study)
+    failures = _failures(instrument)
+    failures += _failures(None if tubes is None else tubes.study)
+    failures += _failures(None if sensing is None else sensing.study)
+    _write(arguments, configuration, folder, chosen, factor, failures, instrument, tubes, sensing)
     print(folder.path / PAGE)
     for failure in failures:
         print(f"keyhole: {failure}", file=sys.stderr)
@@ -142,6 +153,29 @@ def _run_tubes(
     return TubeResults(result, own, measures, took)
 
 
+def _run_sensing(
+    arguments: argparse.Namespace,
+    configuration: Configuration,
+    folder: StudyFolder,
+    stopped: Callable[[], bool],
+) -> SensingResults:
+    began = time.monotonic()
+    own = StudyFolder(folder.path / _SENSING)
+    study = Study(
+        sensing_tasks(arguments.quick),
+        configuration,
+        None,
+        own,
+        arguments.jobs or default_jobs(),
+        arguments.scheduler,
+        sensing_csv,
+    )
+    result = study.run(stopped)
+    took = time.monotonic() - began
+    print(f"shape and force sensing took {clock(took)}", file=sys.stderr)
+    return SensingResults(result, own, took)
+
+
 def _plant(arguments: argparse.Namespace) -> str:
     return str(arguments.plant or PLANTS[0])
 
@@ -175,6 +209,7 @@ def _write(
     failures: list[str],
     instrument: StudyResult[Task] | None,
     tubes: TubeResults | None,
+    sensing: SensingResults | None,
 ) -> None:
     # The drawing library takes a second to load; a refusal need not wait for it.
     from server.report.page import Conditions, page
@@ -198,4 +233,4 @@ def _write(
         failures,
     )
     results = None if instrument is None else Results(instrument, folder)
-    folder.write(PAGE, page(results, configuration, conditions, tubes).encode())
+    folder.write(PAGE, page(results, configuration, conditions, tubes, sensing).encode())

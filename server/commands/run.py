@@ -11,12 +11,20 @@ from typing import Any
 from robot.calibration import Calibration
 from robot.configuration import Configuration
 from robot.priority.levels import CASE_NAMES
+from robot.tension.feasibility import CONTROL_NAMES
 from scenes.boards.board import BOARD_NAMES
 from scenes.experiments import experiment, names
 from scenes.path_file import parse_csv
 from server.calibration import file as calibration_file
 from server.commands.progress_bar import ProgressBar
 from server.commands.run_refusals import RunArgumentError, check_writable, refuse_options, text_of
+from server.commands.run_sensing import (
+    SENSING_OPTIONS,
+    add_sensing_arguments,
+    execute_sensing,
+    is_for_sensing,
+    print_sensing_list,
+)
 from server.commands.run_tubes import (
     TUBE_OPTIONS,
     add_tube_arguments,
@@ -32,6 +40,7 @@ from server.run.figure_table import printed
 from server.run.figures import result_document
 from server.run.headless import TRACE_COLUMNS, HeadlessRun, RunResult
 from server.run.options import (
+    ACTUATIONS,
     COMPENSATIONS,
     PLANTS,
     PRESETS,
@@ -51,12 +60,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--path", metavar="FILE", help="play a CSV path instead of an experiment")
     parser.add_argument("--list", action="store_true", help="list the experiments and stop")
     add_tube_arguments(parser)
+    add_sensing_arguments(parser)
     parser.add_argument("--case", choices=tuple(CASE_NAMES), help="priority case")
     parser.add_argument("--solver", choices=tuple(SOLVER_NAMES), help="how the levels are solved")
     parser.add_argument(
         "--coordinates", choices=tuple(COORDINATE_NAMES), help="segment coordinates (closed forms)"
     )
     add_robot_arguments(parser)
+    parser.add_argument("--tendons", choices=tuple(CONTROL_NAMES), help="what their drives hold")
+    parser.add_argument(
+        "--co-contraction", type=positive, metavar="N", help="tension that no tendon falls below"
+    )
     parser.add_argument("--board", choices=BOARD_NAMES, help="another board than the experiment's")
     parser.add_argument(
         "--seconds", type=positive, metavar="S", help="play only the first S seconds of the path"
@@ -76,6 +90,7 @@ def add_robot_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plant", choices=PLANTS, help="the robot: physics or exact kinematics")
     parser.add_argument("--preset", choices=PRESETS, help="how good the simulated robot is")
     parser.add_argument("--seed", type=seed, metavar="N", help="which robot of that preset")
+    parser.add_argument("--actuation", choices=ACTUATIONS, help="what drives the tendons")
     parser.add_argument("--tracker", choices=("on", "off"), help="whether the tip is tracked")
     parser.add_argument(
         "--compensation", choices=COMPENSATIONS, help="of the tendons' stretch and friction"
@@ -111,8 +126,12 @@ def execute(arguments: argparse.Namespace) -> int:
     configuration = load(arguments.config)
     if arguments.list:
         _print_list(configuration)
+        print_sensing_list()
         print_tube_list()
         return 0
+    if is_for_sensing(arguments):
+        return execute_sensing(arguments, configuration)
+    refuse_options(arguments, SENSING_OPTIONS, "it is of the sensing experiments")
     if is_for_tubes(arguments):
         return execute_tubes(arguments, configuration.concentric)
     refuse_options(arguments, TUBE_OPTIONS, "it is of the concentric-tube experiments")
@@ -174,8 +193,11 @@ def _choices(arguments: argparse.Namespace) -> dict[str, Any]:
         "plant": arguments.plant,
         "preset": arguments.preset,
         "seed": arguments.seed,
+        "actuation": arguments.actuation,
         "tracker": None if arguments.tracker is None else arguments.tracker == "on",
         "compensation": arguments.compensation,
+        "tendons": arguments.tendons,
+        "co_contraction": arguments.co_contraction,
         "realtime": arguments.realtime,
     }
     for name in ("solver", "coordinates", "board"):
@@ -246,6 +268,12 @@ def _print_summary(document: dict[str, Any]) -> None:
             f"tracker {'on' if document['tracker'] else 'off'}, "
             f"compensation {document['compensation']}"
         )
+    if document["actuation"] == "tension-unit":
+        held = document["tendons"]
+        least = (
+            "" if held["control"] == "position" else f", {held['co_contraction_n']:g} N at least"
+        )
+        print(f"  tension unit, {held['control']} control{least}")
     for key, unit in (("position_mm", "mm"), ("orientation_deg", "deg"), ("rcm_mm", "mm")):
         _print_extremes(key.split("_")[0], unit, document["errors"][key])
     for key in ("theta_deg", "direction_deg"):
@@ -259,6 +287,11 @@ def _print_summary(document: dict[str, Any]) -> None:
         print(
             f"  rings        {rings['passed']} of {rings['count']} passed, "
             f"{rings['touched']} touched"
+        )
+    for level in (document["sensing"] or {}).get("levels", ()):
+        print(
+            f"  felt         {level['estimated_n']:.3f} N of {level['true_n']:.3f} N, "
+            f"{level['error_percent']:.1f} % off"
         )
     if document["board"].startswith("silicon"):
         print(f"  ball         {100 * document['ball']['progress']:.1f} % of the groove")

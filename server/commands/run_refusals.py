@@ -38,5 +38,7 @@ def text_of(name: str) -> str:
 def refuse_options(arguments: argparse.Namespace, options: Iterable[str], why: str) -> None:
     """Refuse the first of ``options`` that the command line gives."""
     for option in options:
-        if getattr(arguments, option) not in (None, False):
-            raise RunArgumentError(f"--{option} does not belong here: {why}; leave it out")
+        value = getattr(arguments, option)
+        if value is not None and value is not False:
+            given = option.replace("_", "-")
+            raise RunArgumentError(f"--{given} does not belong here: {why}; leave it out")

@@ -25,8 +25,8 @@ COUNT_DEFAULT, COUNT_MAX = 20, 1000
 SEED_DEFAULT = 1
 TUBE_OPTIONS = ("method", "configuration", "count")
 _INSTRUMENT_OPTIONS = (
-    *("case", "solver", "coordinates", "plant", "preset", "tracker", "compensation", "board"),
-    *("seconds", "calibration", "record", "realtime"),
+    *("case", "solver", "coordinates", "plant", "preset", "actuation", "tracker", "compensation"),
+    *("tendons", "co_contraction", "board", "seconds", "calibration", "record", "realtime"),
 )
 
 

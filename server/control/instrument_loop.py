@@ -24,6 +24,7 @@ from robot.records import (
     Solver,
 )
 from robot.tendons import bend_from_servos
+from robot.tension.feasibility import CONTROL_NAMES
 from robot.urdf import urdf_text
 from scenes.boards.board import board
 from scenes.trocar_motion import Breathing
@@ -56,6 +57,9 @@ def default_settings(configuration: Configuration) -> np.ndarray:
     settings["feed_forward"] = configuration.commands.feed_forward
     settings["compensation"] = COMPENSATION_NAMES[configuration.compensation.mode]
     settings["use_tracker"] = configuration.tracker.enabled
+    settings["sensing"] = configuration.sensing.enabled
+    settings["tendon_control"] = CONTROL_NAMES[configuration.tendons.control]
+    settings["co_contraction"] = configuration.tendons.co_contraction_n
     settings["lambda_reference"] = priority.lambda_reference
     return settings
 
@@ -147,6 +151,7 @@ class InstrumentLoop(ControlLoop):
         self._measured_servo[:] = measurement.servo
         self._measured_tension[:] = measurement.tension
         self._measured_load[:] = measurement.load
+        tick_input["tension_cells"] = measurement.tension_cells
         tick_input["tracker"] = measurement.tracker
         tick_input["measured_contact"] = measurement.contact_n
         self._take_health(measurement)

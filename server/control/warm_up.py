@@ -32,6 +32,8 @@ def warm_up(robot: InstrumentRobot, configuration: Configuration) -> None:
     """
     plant = KinematicPlant(configuration, robot.initial_state()["x"][0])
     loop = InstrumentLoop(robot, plant, configuration)
+    # Also where it is off at first: it may be switched on while the robot moves.
+    loop.settings["sensing"] = 1
     _request(loop, Request.ENABLE)
     loop.leader["timeout_s"] = 1.0
     loop.leader["wxyz"][0] = (1.0, 0.0, 0.0, 0.0)

@@ -20,6 +20,7 @@ from hardware.fake_servos.client import FakeServos, FakeServosProcess
 from robot.configuration import Configuration
 from robot.records import Readiness, Safety
 from robot.safety import REASONS, Event
+from robot.sensing.alignment import REACH_S
 from server.faults.access import Answer, Api
 from server.faults.clock import SettableClock
 from server.faults.demands import BenchFailed, Deadline
@@ -131,6 +132,8 @@ class Bench:
             Deadline.LOST_WEB: WEB_SILENT_MS,
             Deadline.HUNG: HUNG_MS,
             Deadline.LATE: 200.0,
+            Deadline.FLAT: self.configuration.tension_unit.cell_flat_ms + 2.0 * tick_ms,
+            Deadline.ALIGNED: REACH_S * 1e3 + 2.0 * tick_ms,
             Deadline.TOLD: 200.0,
             Deadline.RESTART: 5000.0,
             Deadline.RECORDER: 2000.0,
@@ -319,6 +322,16 @@ class Bench:
     def inject(self, name: str) -> int:
         """Break the simulated robot; when control took the request in, ns."""
         return self._taken(self.api.call("POST", "/faults", {"name": name}))
+
+    def hold_tendons(self, control: str) -> None:
+        """Choose what the drives of the tendons hold.
+
+        Raises:
+            BenchFailed: it was refused.
+        """
+        answer = self.api.call("PUT", "/tendons", {"control": control})
+        if not answer.ok:
+            raise BenchFailed(f"{control} control was refused: {answer.body}")
 
     def mend(self) -> None:
         """Mend the simulated robot."""

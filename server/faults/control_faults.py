@@ -8,16 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot.records import Refusal, Safety
-from robot.safety import REASONS, Event
+from robot.safety import Event
 from server.faults.bench import Bench
 from server.faults.demands import Deadline
 from server.faults.fault import Fault, Finding, Group
-from server.faults.stopping import LOOK_S, NOTICE_S, afterwards, describe, recovered, stamp, stopped
+from server.faults.stopping import (
+    LOOK_S,
+    NOTICE_S,
+    afterwards,
+    describe,
+    deviates,
+    recovered,
+    stamp,
+    stopped,
+)
 from server.faults.watching import (
     Records,
     commanded_path_mm,
     reach_mm,
-    reason,
     safety,
     stands_still,
 )
@@ -67,38 +75,16 @@ def _stuck(bench: Bench, fault: Fault) -> Finding:
 
     The leader turns the tip as well, or a stuck axis may never be asked to go far enough.
     """
+
+    def begin() -> int:
+        began_ns = fault.begin(bench)
+        bench.page.circle.swing(True)
+        return began_ns
+
     try:
-        return _noticed_late(bench, fault)
+        return deviates(bench, fault, begin, _exceeds)
     finally:
         bench.page.circle.swing(False)
-
-
-def _noticed_late(bench: Bench, fault: Fault) -> Finding:
-    bench.arm()
-    bench.watch.mark()
-    began_ns = fault.begin(bench)
-    bench.page.circle.swing(True)
-    place = bench.watch.until(lambda records: safety(records) != Safety.ENABLED, NOTICE_S)
-    finding = Finding()
-    if place is None:
-        fault.mend(bench)
-        finding.message = "nothing noticed it"
-        return finding
-    why = Event(int(reason(bench.watch.records()[place : place + 1])[0]))
-    if why not in _AXIS:
-        fault.mend(bench)
-        finding.message = f"another cause came first: {REASONS[why][0]}"
-        return finding
-    first_ns = stamp(bench.watch.records()[place : place + 1])
-    passed = np.flatnonzero(_exceeds(bench)[: place + 1])
-    onset = bench.watch.records()[passed[0] : passed[0] + 1] if len(passed) else None
-    describe(bench, finding, place, stamp(onset) if onset is not None else began_ns)
-    finding.remark = (
-        f"counted from the deviation passing its limit, {(first_ns - began_ns) * 1e-6:.0f} ms "
-        "after the axis stuck"
-    )
-    afterwards(bench, fault, finding)
-    return finding
 
 
 def _exception(bench: Bench, fault: Fault) -> Finding:
@@ -245,6 +231,7 @@ CONTROL_FAULTS = (
         Deadline.BUS,
         begin=lambda bench: bench.inject("joint-stuck"),
         mend=Bench.mend,
+        events=_AXIS,
         state=Safety.FAULT,
     ),
     Fault(
@@ -255,6 +242,7 @@ CONTROL_FAULTS = (
         Deadline.BUS,
         begin=lambda bench: bench.inject("servo-stuck"),
         mend=Bench.mend,
+        events=_AXIS,
         state=Safety.FAULT,
     ),
     _in_plant("encoder-jump", "An encoder jumps", Event.TRACKING_ERROR, Safety.FAULT,

@@ -17,6 +17,8 @@ class Deadline(Enum):
     LOST_WEB = "the web process may be silent for 1 s"
     HUNG = "the supervisor's patience: 5 s"
     LATE = "the tick that came late"
+    FLAT = "a reading that stays as it is for 60 ms"
+    ALIGNED = "the longest delay of a tracker that sensing aligns"
     TOLD = "the devices' own report, ten times a second"
     RESTART = "until a process is started anew: 5 s"
     RECORDER = "the recorder's next write: 2 s"

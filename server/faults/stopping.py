@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,46 @@ def stopped(bench: Bench, fault: Fault) -> Finding:
     else:
         return finding
     describe(bench, finding, place, began_ns)
+    afterwards(bench, fault, finding)
+    return finding
+
+
+def deviates(
+    bench: Bench,
+    fault: Fault,
+    begin: Callable[[], int],
+    exceeds: Callable[[Bench], NDArray[np.bool_]],
+) -> Finding:
+    """As :func:`stopped` for what cannot be noticed before something deviates too far.
+
+    Args:
+        bench: drives.
+        fault: what is to be noticed, and mended.
+        begin: injects it; when, ns.
+        exceeds: for every record that was seen: whether the deviation is past its limit.
+    """
+    bench.arm()
+    bench.watch.mark()
+    began_ns = begin()
+    place = bench.watch.until(_left_enabled, NOTICE_S)
+    finding = Finding()
+    if place is None:
+        fault.mend(bench)
+        finding.message = "nothing noticed it"
+        return finding
+    first = bench.watch.records()[place : place + 1]
+    why = Event(int(reason(first)[0]))
+    if why not in fault.events:
+        fault.mend(bench)
+        finding.message = f"another cause came first: {REASONS[why][0]}"
+        return finding
+    passed = np.flatnonzero(exceeds(bench)[: place + 1])
+    onset = bench.watch.records()[passed[0] : passed[0] + 1] if len(passed) else None
+    describe(bench, finding, place, stamp(onset) if onset is not None else began_ns)
+    finding.remark = (
+        f"counted from the deviation passing its limit, {(stamp(first) - began_ns) * 1e-6:.0f} ms "
+        f"after it began"
+    )
     afterwards(bench, fault, finding)
     return finding
 

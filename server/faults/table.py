@@ -22,6 +22,7 @@ from server.faults.pose_faults import POSE_FAULTS
 from server.faults.stylus_faults import STYLUS_FAULTS
 from server.faults.surroundings_faults import SURROUNDINGS_FAULTS
 from server.faults.system_faults import LAST_FAULTS, SYSTEM_FAULTS
+from server.faults.tension_faults import TENSION_FAULTS, with_tension_unit
 
 SCHEMA_VERSION = 1
 _ATTEMPTS = 3
@@ -34,6 +35,7 @@ FAULTS: tuple[Fault, ...] = (
     *SURROUNDINGS_FAULTS,
     *POSE_FAULTS,
     *LAST_FAULTS,
+    *TENSION_FAULTS,
 )
 
 
@@ -77,11 +79,12 @@ def run(
         # Who interrupts it gets what was measured until then.
         contextlib.suppress(KeyboardInterrupt),
     ):
-        for kind in ("simulated", "hardware"):
+        for kind in ("simulated", "hardware", "tension-unit"):
             own = [fault for fault in faults if fault.needs == kind]
             if not own:
                 continue
-            with Bench(Path(folder) / kind, base, hardware=kind == "hardware") as bench:
+            broken = with_tension_unit(base) if kind == "tension-unit" else base
+            with Bench(Path(folder) / kind, broken, hardware=kind == "hardware") as bench:
                 for fault in own:
                     progress(len(rows) / len(faults), fault.name)
                     rows.append(measured(bench, fault))

@@ -15,14 +15,8 @@ from __future__ import annotations
 import math
 
 from robot.configuration import Stylus
-from robot.records import LeaderKind
 from server.leaders.control_view import ControlView
-
-ONSET_S = 0.3
-"""How long the force takes to come to its full strength."""
-
-Force = tuple[float, float, float]
-NO_FORCE: Force = (0.0, 0.0, 0.0)
+from server.leaders.led_stylus import NO_FORCE, Force, LedStylus
 
 
 class SpringForce:
@@ -36,35 +30,28 @@ class SpringForce:
     def __init__(self, configuration: Stylus, view: ControlView) -> None:
         self._stiffness = configuration.force_stiffness_n_m
         self._limit = configuration.force_limit_n
-        self._view, self._engaged_ns = view, 0
-        outcome = view.record["outcome"][0]
-        self._state = state = outcome["state"]
-        self._commanded = outcome["report"]["commanded_position"]
+        self._led = LedStylus(view)
+        self._commanded = self._led.outcome["report"]["commanded_position"]
+        state = self._led.state
         self._anchor, self._anchor_tip = (
             state["anchor_leader_position"],
             state["anchor_tip_position"],
         )
-        self._turn = state["anchor_rotation_base_leader"]
 
     @property
     def is_engaged(self) -> bool:
         """Whether the stylus leads, as of the view's last update."""
-        state = self._state
-        return bool(
-            self._view.enabled and state["engaged"] and state["leader_kind"] == LeaderKind.STYLUS
-        )
+        return self._led.is_engaged
 
     def at(self, position: Force, now_ns: int) -> Force:
         """The force in N, in the stylus' frame, on a stylus at ``position`` (m, the same frame)."""
-        state = self._state
-        if not self.is_engaged:
-            self._engaged_ns = 0
+        state, share = self._led.state, self._led.onset(now_ns)
+        if not self._led.is_engaged:
             return NO_FORCE
-        self._engaged_ns = self._engaged_ns or now_ns
         if state["anchor_lock_translation"] or not math.isfinite(sum(position)):
             return NO_FORCE
         scale = float(state["anchor_scale"])
-        turn = self._turn.tolist()
+        turn = self._led.turn.tolist()
         anchor, tip, commanded = (
             self._anchor.tolist(),
             self._anchor_tip.tolist(),
@@ -78,7 +65,6 @@ class SpringForce:
         size = math.sqrt(x * x + y * y + z * z)
         if not math.isfinite(size):
             return NO_FORCE
-        share = min(1.0, (now_ns - self._engaged_ns) * 1e-9 / ONSET_S)
         if size > self._limit:
             share *= self._limit / size
         return x * share, y * share, z * share

@@ -16,14 +16,15 @@ from pathlib import Path
 
 import numpy as np
 
-from robot.configuration import Stylus
+from robot.configuration import Configuration
 from robot.record_types import record_types_of
 from robot.records import LeaderKind, RecordTypes
 from server.control.realtime import PRIORITY, enter, prefer
 from server.leaders import rosbridge
 from server.leaders.connection import Connection, ConnectionFailed, connect, wait
 from server.leaders.control_view import ControlView
-from server.leaders.force import NO_FORCE, Force, SpringForce
+from server.leaders.led_stylus import NO_FORCE, Force
+from server.leaders.sensed_force import make_force
 from server.leaders.status import SAY_NS, StylusReport, StylusStatusFile
 from server.leaders.stylus_input import StylusInput
 from server.memory.leader_slot import LeaderSlot
@@ -45,12 +46,12 @@ class StylusLeader:
 
     Args:
         directory: of a console whose mapped files exist.
-        configuration: the section ``[stylus]``.
+        whole: the configuration of the console.
         types: of the robot that is led.
     """
 
-    def __init__(self, directory: Path, configuration: Stylus, types: RecordTypes) -> None:
-        self._configuration = configuration
+    def __init__(self, directory: Path, whole: Configuration, types: RecordTypes) -> None:
+        self._configuration = configuration = whole.stylus
         self._reader = rosbridge.Reader(configuration.pose_topic, configuration.buttons_topic)
         self._slot = LeaderSlot(directory, LeaderKind.STYLUS)
         self._status = StylusStatusFile(directory, writable=True)
@@ -60,7 +61,7 @@ class StylusLeader:
         # Only the instrument has servos that firmware elsewhere could follow.
         self._servo = command["servo"][0] if "servo" in command.dtype.names else None
         self.stylus = StylusInput(self._slot, configuration)
-        self._spring = SpringForce(configuration, self._view)
+        self._felt = make_force(whole, self._view)
         self._report = StylusReport(configuration.url)
         self._connection: Connection | None = None
         self._message = "not connected yet"
@@ -142,7 +143,7 @@ class StylusLeader:
         if connection is None or not topic:
             return
         silent = now_ns - self.stylus.sample_ns > self._configuration.timeout_ms * 1e6
-        force = NO_FORCE if silent else self._spring.at(self.stylus.position, now_ns)
+        force = NO_FORCE if silent else self._felt.at(self.stylus.position, now_ns)
         if force == NO_FORCE == self._force and now_ns - self._forced_ns < _REPEAT_ZERO_NS:
             return
         if connection.send(rosbridge.publish_force(topic, force, time.time_ns())):
@@ -216,7 +217,7 @@ def _lead(arguments: argparse.Namespace, stopped: Stopped) -> None:
     directory = RunDirectory(arguments.run_directory)
     configuration = directory.configuration()
     types = record_types_of(configuration)
-    leader = StylusLeader(directory.path, configuration.stylus, types)
+    leader = StylusLeader(directory.path, configuration, types)
     # On a busy machine samples otherwise come late, which control must take for silence.
     if not enter(configuration.control.realtime, PRIORITY - 10).startswith("SCHED_FIFO"):
         prefer()

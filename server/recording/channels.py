@@ -12,6 +12,9 @@ import numpy as np
 
 from robot.records import LAMBDA, ErrorSource, LeaderKind, RecordFields, Safety
 from robot.safety import REASONS, Event
+from robot.sensing.faults import SensingFault
+from robot.tension.records import TendonMode
+from server.sensed_force import fault_of
 
 RECORDS = "/records"
 GAPS = "/gaps"
@@ -68,6 +71,12 @@ def _timestamp(time_ns: int) -> dict[str, int]:
 
 def _round(value: float, digits: int = 6) -> float:
     return round(float(value), digits)
+
+
+def _known(values: np.ndarray, digits: int, known: bool) -> list[float | None]:
+    """``values``, or null for each where they are not known."""
+    found: list[float | None] = values.round(digits).tolist()
+    return found if known else [None] * len(found)
 
 
 def _pose(time_ns: int, position: np.ndarray, wxyz: np.ndarray) -> dict[str, Any]:
@@ -149,10 +158,36 @@ def _tubes(record: RecordFields, _: int) -> dict[str, Any]:
 
 
 def _forces(record: RecordFields, _: int) -> dict[str, Any]:
+    measured, command = record["input"], record["outcome"]["command"]
+    held = command["tendon_mode"] == TendonMode.TENSION
     return {
-        "tension_n": record["input"]["measured_tension"].round(5).tolist(),
-        "contact_n": _round(record["input"]["measured_contact"]),
+        "tension_n": _known(measured["measured_tension"], 5, bool(measured["tension_cells"])),
+        "tension_wanted_n": _known(np.where(held, command["tension"], np.nan), 5, True),
+        "contact_n": _round(measured["measured_contact"]),
     }
+
+
+def _sensing(record: RecordFields, _: int) -> dict[str, Any]:
+    report, fault = record["outcome"]["report"], fault_of(record["outcome"]["report"])
+    valid = fault == SensingFault.NONE
+    simulated = record["truth"]["source"] == ErrorSource.TRUE
+    return {
+        "valid": valid,
+        "fault": fault.name.lower(),
+        "force_n": _known(report["estimate_force"], 5, valid),
+        "force_covariance_n2": _known(report["estimate_force_covariance"].ravel(), 9, valid),
+        "tension_n": _known(report["estimate_tension"], 5, valid),
+        "curvature_modes": _known(report["estimate_modes"], 6, valid),
+        "true_force_n": _known(record["truth"]["contact_wrench"][:3], 5, simulated),
+    }
+
+
+def _estimated(record: RecordFields, time_ns: int) -> dict[str, Any]:
+    report = record["outcome"]["report"]
+    position, wxyz = report["estimate_position"], report["estimate_wxyz"]
+    if fault_of(report) != SensingFault.NONE:
+        position, wxyz = np.full(3, np.nan), np.full(4, np.nan)
+    return _pose(time_ns, position, wxyz)
 
 
 def _safety(record: RecordFields, _: int) -> dict[str, Any]:
@@ -213,8 +248,21 @@ _JOINTS_SCHEMA = _object(
 _FORCES_SCHEMA = _object(
     "keyhole.Forces",
     {
-        "tension_n": _numbers(4, "measured tendon tensions, N"),
+        "tension_n": _numbers(4, "measured tendon tensions, N; null where nothing measures it"),
+        "tension_wanted_n": _numbers(4, "tensions that drives are told to hold, N; null: a length"),
         "contact_n": {**_NUMBER, "description": "largest contact force on the instrument, N"},
+    },
+)
+_SENSING_SCHEMA = _object(
+    "keyhole.Sensing",
+    {
+        "valid": {"type": "boolean"},
+        "fault": {**_TEXT, "description": "why there is no estimate; none while it is valid"},
+        "force_n": _numbers(3, "of the environment on the tip, base frame, N"),
+        "force_covariance_n2": _numbers(9, "of it, row by row, N^2"),
+        "tension_n": _numbers(4, "tendon tensions as estimated, N"),
+        "curvature_modes": _numbers(11, "of the segment, from the shaft's end on, rad"),
+        "true_force_n": _numbers(3, "of all contacts together, simulation only, N"),
     },
 )
 _SAFETY_SCHEMA = _object(
@@ -240,6 +288,8 @@ _OWN_CHANNELS = {
         JsonChannel("/errors", "keyhole.Errors", _ERRORS_SCHEMA, _errors),
         JsonChannel("/joints", "keyhole.Joints", _JOINTS_SCHEMA, _joints),
         JsonChannel("/forces", "keyhole.Forces", _FORCES_SCHEMA, _forces),
+        JsonChannel("/sensing", "keyhole.Sensing", _SENSING_SCHEMA, _sensing),
+        JsonChannel("/tip/estimated", "foxglove.PoseInFrame", _POSE, _estimated),
     ),
     "concentric": (
         JsonChannel("/errors", "keyhole.RelativeErrors", _RELATIVE_ERRORS_SCHEMA, _relative_errors),

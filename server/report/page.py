@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
+from typing import NamedTuple
 
 from hardware.physics.preset import PRESETS
 from robot.configuration import Configuration
@@ -16,6 +17,9 @@ from server.report.experiment_sections import PARTS, experiments
 from server.report.markup import Cell
 from server.report.measures import PAPER_TABLE_5, DexterityRow, Table5, table_5
 from server.report.results import Results
+from server.report.sensing_results import SensingResults
+from server.report.sensing_sections import LINKS as SENSING_LINKS
+from server.report.sensing_sections import sensing_sections
 from server.report.targets import Verdict, verdicts
 from server.report.tube_results import TubeResults
 from server.report.tube_sections import LINKS, tube_sections
@@ -37,6 +41,24 @@ bending sweep of the same simulated robot, through its sensors.</li>
 its square, silicon and ring boards are hardware led by a human. Ours is one simulated robot led by
 recorded paths. A smaller figure of ours is not a better robot.</li>
 </ul>"""
+
+
+class _Parts(NamedTuple):
+    """Which parts the page has."""
+
+    instrument: bool
+    tubes: bool
+    sensing: bool
+
+    def heading(self) -> str:
+        """The page's."""
+        if sum(self) > 1:
+            return f"{('Two', 'Three')[sum(self) - 2]} papers’ experiments on simulated robots"
+        if self.tubes:
+            return "Concentric tubes"
+        if self.sensing:
+            return "Shape and force sensing"
+        return "The paper’s experiments on a simulated robot"
 
 
 @dataclass(frozen=True)
@@ -71,6 +93,7 @@ def page(
     configuration: Configuration,
     conditions: Conditions,
     tubes: TubeResults | None = None,
+    sensing: SensingResults | None = None,
 ) -> str:
     """The whole page as HTML; it refers to nothing outside itself.
 
@@ -79,13 +102,17 @@ def page(
         configuration: what they were made under.
         conditions: the rest of it.
         tubes: runs of the concentric-tube arms; None without their part.
+        sensing: runs of shape and force sensing; None without their part.
     """
-    parts = [_head(conditions, results is not None, tubes is not None)]
+    there = _Parts(results is not None, tubes is not None, sensing is not None)
+    parts = [_head(conditions, there)]
     if results is not None:
         parts.append(_instrument(results, configuration, conditions))
     if tubes is not None:
         parts.append(tube_sections(tubes, configuration))
-    parts.append(_made(configuration, conditions, results is not None, tubes))
+    if sensing is not None:
+        parts.append(sensing_sections(sensing))
+    parts.append(_made(configuration, conditions, results is not None, tubes, sensing))
     style = "".join(
         (resources.files(package) / name).read_text(encoding="utf-8")
         for package, name in (
@@ -97,7 +124,7 @@ def page(
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         '<meta name="color-scheme" content="light dark">'
-        f"<title>Keyhole: {_title(conditions, results is not None, tubes is not None)}</title>"
+        f"<title>Keyhole: {_title(conditions, there)}</title>"
         f"<style>{style}</style></head><body><main>{''.join(parts)}</main></body></html>\n"
     )
 
@@ -123,48 +150,50 @@ def _instrument(results: Results, configuration: Configuration, conditions: Cond
     )
 
 
-def _title(conditions: Conditions, instrument: bool, tubes: bool) -> str:
+def _title(conditions: Conditions, there: _Parts) -> str:
     parts = []
-    if instrument:
+    if there.instrument:
         parts.append(f"the paper’s experiments, {markup.text(conditions.preset)} preset")
-    if tubes:
+    if there.tubes:
         parts.append("concentric tubes")
+    if there.sensing:
+        parts.append("shape and force sensing")
     return "; ".join(parts)
 
 
-def _head(conditions: Conditions, instrument: bool, tubes: bool) -> str:
+def _head(conditions: Conditions, there: _Parts) -> str:
     seeds = ", ".join(map(str, conditions.seeds))
     words = f"Keyhole {conditions.version}"
-    if instrument:
+    if there.instrument:
         words += (
             f", {conditions.plant} plant, preset {conditions.preset}, seeds {seeds}. Errors are "
             "desired minus true"
         )
-    title = "The paper’s experiments on a simulated robot"
-    if tubes:
-        title = "Two papers’ experiments on simulated robots" if instrument else "Concentric tubes"
     parts = [
-        f"<header><h1>{title}</h1>",
+        f"<header><h1>{there.heading()}</h1>",
         markup.paragraph(f"{words}. Research software, not a medical device."),
     ]
     notes = []
-    if instrument and conditions.seconds is not None:
+    if there.instrument and conditions.seconds is not None:
         notes.append(
             f"Only the first {conditions.seconds:g} s of each path were played: the figures show "
             "that the report works, and no target counts as met."
         )
-    if instrument and conditions.plant == "kinematic":
+    if there.instrument and conditions.plant == "kinematic":
         notes.append("The kinematic plant is exact: errors are numerical noise, nothing touches.")
     notes += [f"Not run: {failure}" for failure in conditions.failures]
     parts += [markup.paragraph(one, "note") for one in notes]
-    if instrument:
+    if there.instrument:
         links = [("targets", "Targets"), ("fit", "Fit or measured"), ("claims", "Claims")]
         links += [(f"experiment-{part.experiment}", part.experiment) for part in PARTS]
         links += [("twists", "Twists and λ"), ("dexterity", "Table 5")]
         parts.append(_nav("Instrument", links))
-    if tubes:
+    if there.tubes:
         parts.append(_nav("Concentric tubes", LINKS))
-    parts.append(_nav("Both" if instrument and tubes else "", [("made", "How it was made")]))
+    if there.sensing:
+        parts.append(_nav("Shape and force", SENSING_LINKS))
+    shared = ("", "", "Both", "All")[sum(there)]
+    parts.append(_nav(shared, [("made", "How it was made")]))
     return "".join(parts) + "</header>"
 
 
@@ -306,6 +335,7 @@ def _made(
     conditions: Conditions,
     instrument: bool,
     tubes: TubeResults | None,
+    sensing: SensingResults | None,
 ) -> str:
     rows = [
         ["Keyhole", conditions.version],
@@ -330,6 +360,9 @@ def _made(
             ],
             ["their runs and measurements took", f"{tubes.seconds:.0f} s, without what was kept"],
         ]
+    if sensing is not None:
+        took = f"{sensing.seconds:.0f} s, without what was kept"
+        rows.append(["shape and force sensing took", took])
     rows.append(["again", conditions.command])
     return markup.section(
         "made",
@@ -338,7 +371,7 @@ def _made(
         markup.paragraph(
             "The runs stand beside this page: figures as JSON, traces as .npz (a row every 20 ms), "
             "all figures in table.csv. Those of the concentric tubes stand in tubes/, their traces "
-            "with a row every inner iteration.",
+            "with a row every inner iteration; those of sensing in sensing/, with arrays by name.",
             "small",
         ),
     )

@@ -29,6 +29,11 @@ COLOURS = {
     "method-nspqp": "#010123",
     "method-snsqp": "#010124",
     "method-hqp": "#010125",
+    "sensing-ours": "#010131",
+    "sensing-told": "#010132",
+    "sensing-polynomial": "#010133",
+    "sensing-constant": "#010134",
+    "sensing-printed": "#010135",
 }
 """Stand-ins for the page's colours: matplotlib knows no CSS variables, the page fills them in."""
 
@@ -79,9 +84,16 @@ class Plot:
                 ).flat
             )
 
-    def legend(self) -> None:
-        """Names of the first axes' lines, above all on the right, where they hide nothing."""
+    def legend(self, *others: int) -> None:
+        """Names of the first axes' lines, above all on the right, where they hide nothing.
+
+        Args:
+            others: places of axes whose lines are named too.
+        """
         lines, names = self.axes[0].get_legend_handles_labels()
+        for place in others:
+            more, words = self.axes[place].get_legend_handles_labels()
+            lines, names = [*lines, *more], [*names, *words]
         self._figure.legend(
             lines,
             names,

@@ -10,10 +10,14 @@ import numpy as np
 from robot.configuration import Configuration
 from robot.rotations import logarithm, matrix_from_quaternion
 from robot.segment import tip_rotation
+from robot.sensing.faults import SensingFault
 from scenes.boards.board import board
 from server.run.headless import DETAIL_COLUMNS, RunResult
 from server.run.options import RunOptions
 
+_AROUND_MARK_S = 0.5
+_FELT_N = 0.05
+"""No force below this is compared with its estimate."""
 _DETAIL = {name: place for place, name in enumerate(DETAIL_COLUMNS)}
 
 
@@ -57,6 +61,11 @@ def result_document(
         "board": configuration.simulation.board,
         "tracker": configuration.tracker.enabled,
         "compensation": configuration.compensation.mode,
+        "actuation": configuration.simulation.actuation,
+        "tendons": {
+            "control": configuration.tendons.control,
+            "co_contraction_n": configuration.tendons.co_contraction_n,
+        },
         "steps": steps,
         "dt_s": 1.0 / configuration.control.rate_hz,
         "duration_s": float(result.trace[-1, 0]) if steps else 0.0,
@@ -77,6 +86,7 @@ def result_document(
             "held_back": result.limits,
         },
         **_touched(configuration, result.detail),
+        "sensing": _felt(options, result),
         "tick_us": {
             "p50": float(np.percentile(ticks, 50)) if steps else None,
             "p99": float(np.percentile(ticks, 99)) if steps else None,
@@ -108,11 +118,36 @@ def _touched(configuration: Configuration, detail: np.ndarray) -> dict[str, Any]
     }
 
 
+def _felt(options: RunOptions, result: RunResult) -> dict[str, Any]:
+    """How the estimated contact force stands to the true one, at the marks of the experiment.
+
+    At each mark both are averaged over a second around it; the axis is that of the true force.
+    """
+    valid = result.detail[:, _DETAIL["sensing_fault"]] == SensingFault.NONE
+    first = _DETAIL["true_x_n"]
+    true, estimated = result.detail[:, first : first + 3], result.detail[:, first + 3 : first + 6]
+    levels = []
+    for mark in options.marks:
+        near = valid & (np.abs(result.trace[:, 0] - mark) < _AROUND_MARK_S)
+        pushed = true[near].mean(axis=0) if near.any() else np.zeros(3)
+        size = float(np.linalg.norm(pushed))
+        if size < _FELT_N:
+            continue
+        on_axis = float(estimated[near].mean(axis=0) @ pushed) / size
+        error = 100.0 * (on_axis / size - 1.0)
+        levels.append({"true_n": size, "estimated_n": on_axis, "error_percent": error})
+    return {
+        "valid_percent": 100.0 * float(valid.mean()) if len(valid) else None,
+        "levels": levels,
+        "largest_error_percent": max((abs(one["error_percent"]) for one in levels), default=None),
+    }
+
+
 def desired_bend(detail: np.ndarray, desired_wxyz: np.ndarray) -> np.ndarray:
     """The segment's coordinates (n, 2), rad, that the desired orientation asks of a locked arm.
 
     Args:
-        detail: (n, 14) rows with ``DETAIL_COLUMNS``; the first tells how the shaft is turned.
+        detail: (n, 21) rows with ``DETAIL_COLUMNS``; the first tells how the shaft is turned.
         desired_wxyz: (n, 4) desired tip orientations.
     """
     first = detail[0]

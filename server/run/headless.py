@@ -17,6 +17,7 @@ from robot.priority.limits import describe, speed_violations, violations
 from robot.records import Request, Safety
 from robot.safety import REASONS, Event
 from robot.segment import polar
+from robot.tension.feasibility import check_configured
 from scenes.lead_in import anchored
 from scenes.path import Path
 from server.calibration.sweep import calibration_for
@@ -37,6 +38,8 @@ DETAIL_COLUMNS = (
     *("contact_count", "contact_force_n", "rings_passed", "rings_touched", "ball_progress"),
     *("commanded_qw", "commanded_qx", "commanded_qy", "commanded_qz"),
     *("commanded_u_rad", "commanded_v_rad"),
+    *("sensing_fault", "true_x_n", "true_y_n", "true_z_n"),
+    *("estimated_x_n", "estimated_y_n", "estimated_z_n"),
 )
 
 SETTLING_S = 0.5
@@ -49,7 +52,7 @@ class RunResult:
 
     Attributes:
         trace: (steps, 28) rows with ``TRACE_COLUMNS``.
-        detail: (steps, 14) rows with ``DETAIL_COLUMNS``.
+        detail: (steps, 21) rows with ``DETAIL_COLUMNS``.
         errors: (steps, 3) position in m, orientation in rad, RCM in m, against the truth.
         tick_ns: (steps,) time of the controller's tick.
         realtime_factor: plant time over wall time, controller and plant together.
@@ -107,6 +110,8 @@ def _detail_row(record: np.void, out: np.ndarray) -> None:
     out[5], out[6] = truth["rings_passed"], truth["rings_touched"]
     out[7] = truth["ball_progress"]
     out[8:12], out[12:14] = report["commanded_wxyz"], report["x"][7:9]
+    out[14], out[15:18] = report["estimate_fault"], truth["contact_wrench"][:3]
+    out[18:21] = report["estimate_force"]
 
 
 class HeadlessRun:
@@ -141,6 +146,7 @@ class HeadlessRun:
         check_names(options)
         self.options = options
         self.configuration = configuration = options.applied(configuration)
+        check_configured(configuration)
         self.calibration = calibration or calibration_for(configuration, progress)
         self._robot = InstrumentRobot(configuration, self.calibration)
         x = self._robot.initial_state()["x"][0]

@@ -8,14 +8,17 @@ from typing import Any, Literal, get_args
 from robot.configuration import Configuration
 from robot.errors import UnknownName
 from robot.priority.levels import CASE_NAMES
+from robot.tension.feasibility import CONTROL_NAMES
 from scenes.experiments import Experiment
 from scenes.path import Path
 
 PlantName = Literal["physics", "kinematic"]
 PresetName = Literal["ideal", "paper", "harsh"]
+ActuationName = Literal["servos", "tension-unit"]
 CompensationName = Literal["off", "gain", "full"]
 PLANTS: tuple[PlantName, ...] = get_args(PlantName)
 PRESETS: tuple[PresetName, ...] = get_args(PresetName)
+ACTUATIONS: tuple[ActuationName, ...] = get_args(ActuationName)
 COMPENSATIONS: tuple[CompensationName, ...] = get_args(CompensationName)
 SEED_MAX = 2**31 - 1
 
@@ -33,9 +36,12 @@ class RunOptions:
         plant: ``physics`` or ``kinematic``.
         preset: how good the simulated robot is.
         seed: draws what differs between robots of one preset.
+        actuation: what drives the tendons; the tension unit measures their tension.
         board: what stands before the instrument.
         tracker: whether a tip tracker is there and used.
         compensation: how stretch and friction of the tendons are met.
+        tendons: what their drives hold: ``position``, ``hybrid`` or ``tension``.
+        co_contraction: tension that no tendon falls below in the last two, N.
         lock_arm: whether the arm stands still.
         realtime: whether the wall clock paces the run.
         from_start: whether the path begins at the configuration's start, as boards want it, rather
@@ -51,9 +57,12 @@ class RunOptions:
     plant: str | None = None
     preset: str | None = None
     seed: int | None = None
+    actuation: str | None = None
     board: str | None = None
     tracker: bool | None = None
     compensation: str | None = None
+    tendons: str | None = None
+    co_contraction: float | None = None
     lock_arm: bool = False
     realtime: bool = False
     from_start: bool = False
@@ -65,6 +74,7 @@ class RunOptions:
             "plant": self.plant,
             "preset": self.preset,
             "seed": self.seed,
+            "actuation": self.actuation,
             "board": self.board,
         }
         priority = {"case": self.case, "solver": self.solver, "coordinates": self.coordinates}
@@ -73,6 +83,7 @@ class RunOptions:
             "simulation": simulation,
             "tracker": {"enabled": self.tracker},
             "compensation": {"mode": self.compensation},
+            "tendons": {"control": self.tendons, "co_contraction_n": self.co_contraction},
         }
         update = {
             name: getattr(configuration, name).model_copy(
@@ -89,7 +100,9 @@ def check_names(options: RunOptions) -> None:
         ("priority case", options.case, tuple(CASE_NAMES)),
         ("plant", options.plant, PLANTS),
         ("preset", options.preset, PRESETS),
+        ("actuation", options.actuation, ACTUATIONS),
         ("compensation", options.compensation, COMPENSATIONS),
+        ("tendon control", options.tendons, tuple(CONTROL_NAMES)),
     ):
         if name is not None and name not in known:
             raise UnknownName(kind, name, tuple(known))

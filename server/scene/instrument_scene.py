@@ -28,6 +28,7 @@ from server.scene.palette import PLINTH
 from server.scene.robot import SceneRobot
 from server.scene.robot_scene import RobotScene
 from server.scene.segment import SceneSegment
+from server.scene.sensed import SceneSensed
 from server.scene.shapes import Mesh, round_bar
 from server.scene.trocar import ROOT as TROCAR
 from server.scene.trocar import WALL_OPACITY, SceneTrocar
@@ -79,6 +80,7 @@ class InstrumentScene(RobotScene):
         joints = [joint.name for joint in configuration.arm.joints]
         self.arm = SceneRobot(server, model_directory, joints)
         self._segment = SceneSegment(server, configuration.instrument)
+        self._sensed = SceneSensed(server, configuration)
         self._trocar = SceneTrocar(server, configuration)
         self.board = SceneBoard(server, configuration.instrument)
         self.board.show(board(configuration.simulation.board, configuration))
@@ -127,7 +129,8 @@ class InstrumentScene(RobotScene):
         tip_rotation(float(truth["uv"][0]), float(truth["uv"][1]), bend)
         trocar, position, inward = self.work(record)
         self.arm.update(truth["q"])
-        self._segment.update(truth["shaft_end"], tip @ bend.T, truth["uv"])
+        self._segment.update(truth["shaft_end"], tip @ bend.T, truth["uv"], truth["position"])
+        self._sensed.update(now, report)
         self.board.update(now, truth, tip @ bend.T)
         self._trocar.update(trocar, -inward)
         self.frames.update((position, truth["wxyz"]))

@@ -1,7 +1,7 @@
 """Colours of the scene, sRGB 0-255.
 
-Desired, commanded, measured and true look the same here, on the operator page and in its plots;
-whoever changes one changes both.
+Desired, commanded, measured, estimated and true look the same here, on the operator page and in its
+plots; whoever changes one changes both.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ Colour = tuple[int, int, int]
 DESIRED: Colour = (47, 125, 225)
 COMMANDED: Colour = (138, 92, 214)
 MEASURED: Colour = (217, 138, 0)
+ESTIMATED: Colour = (138, 16, 96)
+"""Always in broken lines too: hoops around the segment here, dashes in the plots."""
 TRUE: Colour = (31, 157, 107)
 
 # The scene's light is strong: solid bodies come out lighter than what stands here.
@@ -28,6 +30,10 @@ TUBES: tuple[Colour, ...] = (
 """Concentric tubes, the innermost first; the page's plots have the same."""
 ENDOSCOPE: Colour = (150, 156, 168)
 CHANNEL: Colour = (40, 44, 52)
+FAINT: Colour = (158, 124, 144)
+"""An estimate that does not stand out from its uncertainty."""
+UNKNOWN: Colour = (124, 130, 142)
+"""A direction along which nothing is known, as a broken line."""
 WARNING: Colour = (196, 26, 36)
 """What should be and is not; always said in words or by a broken line too."""
 

@@ -1,5 +1,8 @@
 """The continuum segment: twelve disks, the backbone and four coloured tendons.
 
+Its shape is that of constant curvature, pulled aside smoothly to where the tip is: something that
+presses on the tip bends the segment by more than a circle.
+
 Two batched meshes carry all of it, so a bend costs four messages.
 """
 
@@ -10,15 +13,16 @@ import viser
 from numpy.typing import NDArray
 
 from robot.configuration import Instrument
-from robot.rotations import quaternion_from_matrix
+from robot.rotations import exponential, multiply, quaternion_from_matrix
 from robot.segment import shape_frames
 from server.scene.palette import BACKBONE, DISK, TENDONS
-from server.scene.shapes import quaternions_from_z, revolve, round_bar
+from server.scene.shapes import quaternions_from_z, quaternions_of, revolve, round_bar
 
 ROOT = "/instrument"
 BEND_RESOLUTION = 1e-4
 """Changes of (u, v) smaller than this (rad) are not sent: 3 micrometres at the tip."""
 POSITION_RESOLUTION = 5e-6
+ASIDE_RESOLUTION = 2e-5
 DISK_SHARE = 0.36
 """Thickness of a disk as a share of the distance between two."""
 TENDON_WIDTH = 2.4
@@ -54,7 +58,7 @@ class SceneSegment:
             f"{ROOT}/disks",
             disk.vertices,
             disk.faces,
-            _quaternions(rotations[1:]),
+            quaternions_of(rotations[1:]),
             positions[1:],
             batched_colors=DISK,
             lod="off",
@@ -71,7 +75,7 @@ class SceneSegment:
             batched_colors=self._colours(),
             lod="off",
         )
-        self._drawn = np.zeros(2)
+        self._drawn, self._drawn_aside = np.zeros(2), np.zeros(3)
         self._drawn_position = np.full(3, np.nan)
         self._drawn_wxyz = np.full(4, np.nan)
 
@@ -95,11 +99,34 @@ class SceneSegment:
         directions = steps / np.linalg.norm(steps, axis=2, keepdims=True)
         return middles.reshape(-1, 3), directions.reshape(-1, 3)
 
+    def _pull_aside(
+        self,
+        positions: NDArray[np.float64],
+        rotations: NDArray[np.float64],
+        aside: NDArray[np.float64],
+    ) -> None:
+        """Move the tip by ``aside`` (3,) and all before it along with it, in place.
+
+        The segment's direction changes neither at its base nor at its tip.
+        """
+        s = self._fractions[:, None]
+        positions += s**2 * (3.0 - 2.0 * s) * aside
+        before = rotations[:, :, 2].copy()
+        after = before + 6.0 * s * (1.0 - s) * aside / self._length
+        after /= np.linalg.norm(after, axis=1, keepdims=True)
+        turn, old = np.empty((3, 3)), np.empty((3, 3))
+        for index, vector in enumerate(np.cross(before, after)):
+            # The sine of the angle is near enough to the angle.
+            exponential(vector, turn)
+            old[:] = rotations[index]
+            multiply(turn, old, rotations[index])
+
     def update(
         self,
         position: NDArray[np.float64],
         rotation: NDArray[np.float64],
         bend: NDArray[np.float64],
+        tip: NDArray[np.float64],
     ) -> None:
         """Draw the segment, sending only what changed.
 
@@ -107,6 +134,7 @@ class SceneSegment:
             position: (3,) segment base in the world, m.
             rotation: (3, 3) of the segment base frame in the world.
             bend: (2,) u and v, rad.
+            tip: (3,) in the world, m.
         """
         if not np.allclose(position, self._drawn_position, rtol=0.0, atol=POSITION_RESOLUTION):
             self._drawn_position[:] = position
@@ -116,21 +144,17 @@ class SceneSegment:
         if not np.allclose(wxyz, self._drawn_wxyz, rtol=0.0, atol=POSITION_RESOLUTION):
             self._drawn_wxyz[:] = wxyz
             self._root.wxyz = wxyz
-        if np.abs(bend - self._drawn).max() < BEND_RESOLUTION:
-            return
-        self._drawn[:] = bend
         positions, rotations = shape_frames(
             float(bend[0]), float(bend[1]), self._length, self._fractions
         )
+        aside = rotation.T @ (tip - position) - positions[-1]
+        bent = np.abs(bend - self._drawn).max() >= BEND_RESOLUTION
+        if not bent and np.abs(aside - self._drawn_aside).max() < ASIDE_RESOLUTION:
+            return
+        self._drawn[:], self._drawn_aside[:] = bend, aside
+        self._pull_aside(positions, rotations, aside)
         places, directions = self._pieces(positions, rotations)
         self._disks.batched_positions = positions[1:].astype(np.float32)
-        self._disks.batched_wxyzs = _quaternions(rotations[1:])
+        self._disks.batched_wxyzs = quaternions_of(rotations[1:])
         self._lines.batched_positions = places.astype(np.float32)
         self._lines.batched_wxyzs = quaternions_from_z(directions).astype(np.float32)
-
-
-def _quaternions(rotations: NDArray[np.float64]) -> NDArray[np.float32]:
-    wxyzs = np.empty((len(rotations), 4))
-    for rotation, wxyz in zip(rotations, wxyzs, strict=True):
-        quaternion_from_matrix(rotation, wxyz)
-    return wxyzs.astype(np.float32)

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from robot.rotations import quaternion_from_matrix
+
 
 class Mesh(NamedTuple):
     """Vertices (V, 3) float32 in m and triangles (F, 3) uint32, outward by the right-hand rule."""
@@ -93,6 +95,14 @@ def merge(*meshes: Mesh) -> Mesh:
     offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
     faces = [mesh.faces + np.uint32(offset) for mesh, offset in zip(meshes, offsets, strict=True)]
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+def quaternions_of(rotations: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Rotation matrices (n, 3, 3) as quaternions (n, 4) wxyz."""
+    wxyzs = np.empty((len(rotations), 4))
+    for rotation, wxyz in zip(rotations, wxyzs, strict=True):
+        quaternion_from_matrix(np.ascontiguousarray(rotation), wxyz)
+    return wxyzs.astype(np.float32)
 
 
 def quaternions_from_z(directions: NDArray[np.float64]) -> NDArray[np.float64]:

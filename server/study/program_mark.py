@@ -11,6 +11,13 @@ _DECIDING = ("robot", "scenes", "hardware", "server/control")
 _DECIDING_FILES = (
     *("server/run/headless.py", "server/run/figures.py"),
     *("server/run/tube_run.py", "server/run/tube_figures.py"),
+    *(
+        f"server/run/sensing_{name}.py"
+        for name in (
+            *("options", "rod", "calibration", "methods", "samples", "run", "coverage", "tension"),
+            *("figures", "traces", "chirp"),
+        )
+    ),
     *("server/study/work.py", "server/study/task.py"),
 )
 _KINDS = (".py", ".toml", ".csv")

@@ -28,6 +28,8 @@ _ACTS = {
     ("PUT", "priority"): "change the priority",
     ("PUT", "teleoperation"): "change the settings of the leader",
     ("PUT", "compensation"): "change the compensation",
+    ("PUT", "tendons"): "change what the tendons hold",
+    ("PUT", "sensing"): "switch sensing on or off",
     ("PUT", "board"): "change the board",
     ("POST", "trocar"): "register the trocar",
     ("PUT", "trocar/breathing"): "change the breathing",

@@ -93,7 +93,7 @@ async def faults(services: ServicesHere, _: AnyCaller) -> list[FaultEntry]:
     active = services.requests.fault
     return [
         FaultEntry(name=name, title=fault.title, active=name == active)
-        for name, fault in plant_faults(services.configuration.robot).items()
+        for name, fault in plant_faults(services.configuration).items()
     ]
 
 
@@ -103,7 +103,7 @@ async def inject(body: FaultInjection, services: ServicesHere, caller: Operator)
     from hardware.faulty_plant import plant_faults
 
     _check_simulated(services)
-    known = plant_faults(services.configuration.robot)
+    known = plant_faults(services.configuration)
     if body.name not in known:
         raise UnknownName("fault", body.name, tuple(known))
     await services.requests.inject_fault(body.name)

@@ -161,6 +161,30 @@ class CompensationChange(Body):
     )
 
 
+class SensingChange(Body):
+    """Whether shape and force are estimated."""
+
+    enabled: Flag = Field(description="Takes effect with the next tick.", examples=[True])
+
+
+class TendonsChange(Body):
+    """What the drives of the tendons hold."""
+
+    control: Literal["position", "hybrid", "tension"] | None = Field(
+        None,
+        description="All their length; the pulled one of each pair its length and the loose one "
+        "its tension; all their tension.",
+        examples=["hybrid"],
+    )
+    co_contraction_n: Number | None = Field(
+        None,
+        ge=0.2,
+        le=50,
+        description="Tension that no tendon falls below where tensions are held, N.",
+        examples=[2.0],
+    )
+
+
 class BoardChange(Body):
     """Which board shall stand before the instrument."""
 

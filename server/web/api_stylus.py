@@ -13,7 +13,7 @@ from starlette.websockets import WebSocketDisconnect, WebSocketState
 
 from robot.errors import KeyholeError
 from robot.records import DriveMode
-from server.leaders.force import NO_FORCE
+from server.leaders.led_stylus import NO_FORCE
 from server.memory.stylus_records import STYLUS_COUNTS
 from server.web.access import Caller
 from server.web.access_guard import caller_of

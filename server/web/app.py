@@ -25,7 +25,9 @@ from server.web import (
     api_replay,
     api_robot,
     api_safety,
+    api_sensing,
     api_stylus,
+    api_tendons,
     api_trocar,
     other_robots,
     problems,
@@ -38,7 +40,7 @@ from server.web.services import make_services
 from server.web.viser_proxy import ViserAddress, viser_router
 
 _OWN_PARTS = {
-    "instrument": (api_priority, api_trocar, api_boards),
+    "instrument": (api_priority, api_tendons, api_trocar, api_boards, api_sensing),
     "concentric": (api_method,),
 }
 

@@ -13,17 +13,20 @@ from robot.parameters import parameters
 from robot.priority.levels import CASE_NAMES
 from robot.priority.limits import describe
 from robot.records import LAMBDA, Case, Compensation, Coordinates, Solver
+from robot.sensing.faults import SensingFault
+from robot.tension.feasibility import CONTROL_NAMES
 from scenes.boards.board import BOARD_NAMES, board
 from server.web.devices_view import clearance_view
+from server.web.sensing_view import measured_tension, sensing_view
 from server.web.state_message import (
     StateMessages,
     Surroundings,
     degrees,
-    each,
     error_source,
     millimetres,
     rounded,
 )
+from server.web.tendons_view import tendons_view
 
 CASES = {case: name for name, case in CASE_NAMES.items()}
 SOLVERS = {solver: solver.name.lower().replace("_", "-") for solver in Solver}
@@ -40,11 +43,13 @@ class InstrumentMessages(StateMessages):
 
     CONFIGURED = (
         *StateMessages.CONFIGURED,
-        *("priority", "bend_limit_deg", "joint_limits_deg", "compensation", "tracker"),
+        *("priority", "bend_limit_deg", "joint_limits_deg", "compensation", "tracker", "sensing"),
+        *("tendons", "actuation"),
     )
 
     def __init__(self, configuration: Configuration) -> None:
         super().__init__(configuration)
+        self._unknown["outcome"]["report"]["estimate_fault"] = SensingFault.OFF
         self._parameters = parameters(configuration)
         self._limits = configuration.limits
         self._boards: dict[str, tuple[int, bool]] = {}
@@ -60,6 +65,9 @@ class InstrumentMessages(StateMessages):
         settings["coordinates"] = Coordinates[priority.coordinates.upper()]
         settings["compensation"] = Compensation[self._configuration.compensation.mode.upper()]
         settings["use_tracker"] = self._configuration.tracker.enabled
+        settings["sensing"] = self._configuration.sensing.enabled
+        settings["tendon_control"] = CONTROL_NAMES[self._configuration.tendons.control]
+        settings["co_contraction"] = self._configuration.tendons.co_contraction_n
 
     def load(self) -> None:
         """Find out about every board."""
@@ -94,7 +102,12 @@ class InstrumentMessages(StateMessages):
                 Compensation(int(tick_input["settings"]["compensation"]))
             ],
             "tracker": _tracker(tick_input, state),
-            "tension_n": each(tick_input["measured_tension"], 3),
+            "tension_n": measured_tension(tick_input),
+            "sensing": sensing_view(record, around, self._configuration.sensing),
+            "tendons": tendons_view(record, self._configuration),
+            "actuation": self._configuration.simulation.actuation
+            if around.plant == "physics"
+            else None,
             "board": around.board,
             **self._touched(record, around.board),
             "residuals": {

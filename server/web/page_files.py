@@ -48,8 +48,8 @@ text. The client may send
 - `{"type":"hold","down":true}`: hold-to-move, repeated at least twice a second while down
 - `{"type":"renew"}`: the operator goes on driving
 - `{"type":"leader","position_mm":[0,0,0],"orientation_wxyz":[1,0,0,0],"clutch":true}`
+- `{"type":"let-go"}`: the operator's mouse button came up over the scene
 - `{"type":"emergency-stop"}`
-
 - `{"type":"page-error","words":"..."}`: a part of the page failed, for the audit log
 
 A message that is refused is answered by `{"type":"problem","problem":{...}}`. When the operator's

@@ -16,6 +16,7 @@ from starlette.responses import Response
 
 from robot.errors import KeyholeError, UnknownName
 from robot.safety import RequestRefused
+from robot.tension.feasibility import TensionsNotMeasured
 from server.web.refusals import WebRefusal
 
 MEDIA_TYPE = "application/problem+json"
@@ -27,7 +28,7 @@ def status_of(error: KeyholeError) -> int:
     """HTTP status under which a refusal leaves the server."""
     if isinstance(error, WebRefusal):
         return error.status
-    if isinstance(error, RequestRefused):
+    if isinstance(error, RequestRefused | TensionsNotMeasured):
         return HTTPStatus.CONFLICT
     if isinstance(error, UnknownName):
         return HTTPStatus.NOT_FOUND

@@ -24,6 +24,7 @@ from server.web.dexterity_source import DexteritySource
 from server.web.events import WebEvents
 from server.web.gamepad_leader import GamepadLeader
 from server.web.lease import Lease
+from server.web.open_scenes import OpenScenes
 from server.web.operator_watch import OperatorWatch
 from server.web.recordings import Recordings
 from server.web.state_source import StateSource
@@ -53,6 +54,7 @@ class Services:
         recordings: to the recorder process.
         replay: to the process that shows a recording; None where there is a robot.
         selection: of another robot, for the supervisor.
+        scenes: that browsers show.
         scene: ``loading``, ``ready``, or why there is no scene.
     """
 
@@ -73,6 +75,7 @@ class Services:
     recordings: Recordings
     replay: ReplayLink | None
     selection: RobotSelection
+    scenes: OpenScenes
     scene: Callable[[], str]
 
     def state(self, caller: Caller) -> Response:
@@ -119,6 +122,7 @@ def make_services(
         Recordings(recorder),
         replay,
         RobotSelection(link.directory),
+        OpenScenes(),
         scene,
     )
 

@@ -13,6 +13,7 @@ from robot.concentric.design import MethodName
 from server.web.device_schema import ClearancePart, DevicesPart, ReadinessPart
 
 Millimetres = list[float | None]
+Newtons = list[float | None]
 
 
 class Part(BaseModel):
@@ -128,6 +129,54 @@ class TrackerPart(Part):
     correction_deg: float | None
 
 
+class ForceAxisPart(Part):
+    """One axis of the uncertainty of the sensed force."""
+
+    direction: list[float | None] = Field(
+        min_length=3, max_length=3, description="Unit vector, base frame."
+    )
+    component_n: float | None = Field(description="Of the force, never negative.")
+    deviation_n: float | None = Field(description="Its standard deviation.")
+    observable: bool = Field(
+        description="False where the deviation is at least half of expected_n: hardly anything "
+        "was learned along this axis."
+    )
+
+
+class SensingPart(Part):
+    """Shape and force as estimated from tip pose and tendon tensions; null while not valid."""
+
+    enabled: bool
+    valid: bool
+    fault: str = Field(description="Why there is no estimate, for programs; none while valid.")
+    reason: str
+    action: str
+    force_n: Newtons = Field(
+        min_length=3, max_length=3, description="Of the environment on the tip, base frame."
+    )
+    magnitude_n: float | None
+    deviation_n: float | None = Field(
+        description="Standard deviation of the force along its own direction."
+    )
+    expected_n: float = Field(
+        description="Standard deviation of the forces that are expected beforehand."
+    )
+    axes: list[ForceAxisPart] = Field(
+        max_length=3, description="The best known first; empty while not valid."
+    )
+    true_force_n: Newtons = Field(
+        min_length=3,
+        max_length=3,
+        description="Of all contacts on the instrument together, base frame; simulation only.",
+    )
+    tip: PosePart = Field(description="As estimated.")
+    cells: bool = Field(description="Whether the robot measures the tension of its tendons.")
+    tension_n: Newtons = Field(
+        min_length=4, max_length=4, description="As estimated, at the segment's base."
+    )
+    tension_full_scale_n: float = Field(description="End of a tension cell's range.")
+
+
 class ContactPart(Part):
     """What the instrument touches."""
 
@@ -160,6 +209,25 @@ class ReplayPart(Part):
     speed: float = Field(description="Recorded time over real time.")
     started: str = Field(description="When it was recorded, UTC.")
     cut: bool = Field(description="Whether the recording was cut off.")
+
+
+class TendonsPart(Part):
+    """What the drives of the tendons hold; a number for each tendon."""
+
+    control: Literal["position", "hybrid", "tension"]
+    co_contraction_n: float | None = Field(
+        description="Tension that no tendon falls below where tensions are held."
+    )
+    largest_co_contraction_n: float | None = Field(description="That may be asked for.")
+    holds: list[Literal["position", "tension"]] = Field(min_length=4, max_length=4)
+    wanted_n: Newtons = Field(
+        min_length=4, max_length=4, description="Null where a length is held."
+    )
+    stiffness_mnm_rad: list[float | None] = Field(
+        min_length=2,
+        max_length=2,
+        description="Of the bend u and v, by the model; null where no tension is measured.",
+    )
 
 
 class SharedState(Part):
@@ -210,7 +278,16 @@ class StateMessage(SharedState):
     clearance: ClearancePart
     compensation: Literal["off", "gain", "full"]
     tracker: TrackerPart
-    tension_n: list[float | None] = Field(min_length=4, max_length=4)
+    tension_n: Newtons = Field(
+        min_length=4,
+        max_length=4,
+        description="As measured; null where nothing measures it.",
+    )
+    sensing: SensingPart
+    tendons: TendonsPart
+    actuation: Literal["servos", "tension-unit"] | None = Field(
+        description="What drives the tendons of the simulated robot; null for any other."
+    )
     contact: ContactPart
     rings: RingsPart | None = Field(description="Null without rings.")
     ball: BallPart | None = Field(description="Null without a ball.")

@@ -61,6 +61,12 @@ class Renew(Body):
     type: Literal["renew"]
 
 
+class LetGo(Body):
+    """The operator's mouse button came up over the scene: no gizmo is dragged."""
+
+    type: Literal["let-go"]
+
+
 class EmergencyStop(Body):
     """Stop all motion; taken whatever else stands in the message."""
 
@@ -90,7 +96,9 @@ class GamepadMessage(Body):
     buttons: Annotated[int, Field(strict=True, ge=0, le=3)]
 
 
-Incoming = Heartbeat | Hold | Renew | EmergencyStop | PageError | LeaderMessage | GamepadMessage
+Incoming = (
+    Heartbeat | Hold | Renew | LetGo | EmergencyStop | PageError | LeaderMessage | GamepadMessage
+)
 _incoming: TypeAdapter[Incoming] = TypeAdapter(Annotated[Incoming, Field(discriminator="type")])
 router = APIRouter()
 
@@ -243,6 +251,9 @@ class StreamClient:
                 services.watch.hold(presence, message.down)
             case Renew():
                 services.lease.renew(self._caller)
+            case LetGo():
+                services.lease.check(self._caller)
+                services.scenes.let_go()
             case PageError():
                 services.events.page_failed(self._caller, message.words)
             case GamepadMessage():

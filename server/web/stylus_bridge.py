@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from robot.configuration import Configuration
 from robot.records import LeaderKind
 from server.leaders.control_view import ControlView
-from server.leaders.force import NO_FORCE, Force, SpringForce
+from server.leaders.led_stylus import NO_FORCE, Force
 from server.leaders.rosbridge import UNDECODABLE
+from server.leaders.sensed_force import make_force
 from server.leaders.status import SAY_NS, StylusReport, StylusStatusFile
 from server.leaders.stylus_input import StylusInput
 from server.memory.leader_slot import LeaderSlot
@@ -95,7 +96,7 @@ class StylusBridge:
             return
         self._view = ControlView(link.directory, link.types)
         self._stylus = StylusInput(LeaderSlot(link.directory, LeaderKind.STYLUS), stylus)
-        self._spring = SpringForce(stylus, self._view)
+        self._felt = make_force(configuration, self._view)
         self._report = StylusReport("this console's own WebSocket")
         self._bridge: object = None
         self._heard_ns = self._said_ns = 0
@@ -175,8 +176,8 @@ class StylusBridge:
             self._force = NO_FORCE
             return NO_FORCE, False
         self._view.update(now_ns)
-        self._force = self._spring.at(self._stylus.position, now_ns)
-        return self._force, self._spring.is_engaged
+        self._force = self._felt.at(self._stylus.position, now_ns)
+        return self._force, self._felt.is_engaged
 
     def status(self) -> NDArray[Any] | None:
         """What is known of the stylus, (1,) STYLUS_STATUS; None where its process is silent."""

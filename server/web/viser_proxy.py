@@ -85,12 +85,17 @@ class _Upward:
     """From the browser to viser: only what the filter lets pass."""
 
     def __init__(
-        self, upstream: ClientConnection, websocket: WebSocket, services: Services
+        self,
+        upstream: ClientConnection,
+        websocket: WebSocket,
+        services: Services,
+        asked: asyncio.Event,
     ) -> None:
         self._upstream, self._websocket = upstream, websocket
         self._services, self._lease = services, services.lease
         self._caller = caller_of(websocket.scope)
         self._filter = ViserFilter()
+        self._asked = asked
 
     async def pass_on(self) -> None:
         """Pass messages on until the browser goes."""
@@ -112,10 +117,14 @@ class _Upward:
         self._services.events.refused(Asked("POST", DRAG, address, self._caller), refusal)
 
     async def end_lost_drags(self) -> None:
-        """Let go what the browser drags when it loses the lease; end with its session."""
+        """Let go what the browser drags when its page asks for it, or it loses the lease; end with
+        its session.
+        """
         while self._services.access.left_s(self._caller) > 0.0:
-            await asyncio.sleep(_LEASE_WATCH_S)
-            if not self._lease.is_held_by(self._caller):
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._asked.wait(), _LEASE_WATCH_S)
+            if self._asked.is_set() or not self._lease.is_held_by(self._caller):
+                self._asked.clear()
                 for frame in self._filter.ends_of_drags():
                     await self._upstream.send(frame)
 
@@ -123,20 +132,21 @@ class _Upward:
 async def _pass_through(
     upstream: ClientConnection, websocket: WebSocket, services: Services
 ) -> None:
-    upward = _Upward(upstream, websocket, services)
-    tasks = [
-        asyncio.create_task(_down(upstream, websocket)),
-        asyncio.create_task(upward.pass_on()),
-        asyncio.create_task(upward.end_lost_drags()),
-    ]
-    try:
-        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        for task in tasks:
-            task.cancel()
-        for task in tasks:
-            with contextlib.suppress(asyncio.CancelledError, *_GONE):
-                await task
+    with services.scenes.one() as asked:
+        upward = _Upward(upstream, websocket, services, asked)
+        tasks = [
+            asyncio.create_task(_down(upstream, websocket)),
+            asyncio.create_task(upward.pass_on()),
+            asyncio.create_task(upward.end_lost_drags()),
+        ]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+            for task in tasks:
+                with contextlib.suppress(asyncio.CancelledError, *_GONE):
+                    await task
 
 
 def viser_router(address: Callable[[], ViserAddress | None]) -> APIRouter:

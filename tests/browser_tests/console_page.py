@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
 
+import numpy as np
 from playwright.sync_api import BrowserContext, Locator
 
 from tests.server.console_process import ConsoleProcess, eventually
 
 JSON = dict[str, Any]
+Driven = TypeVar("Driven")
 
 SCENE_S = 120.0
 """Without a graphics card, and beside other work, the first picture takes its time."""
 SLOW_S = 30.0
 
+STALLS = {"leader_stale", "control_late"}
+DRIVES = 5
+"""How often one drives anew where the browser or the machine stalled."""
+
 GRIP_M = 0.045
 """Where on an arrow of the gizmo the mouse takes it, from the tip."""
 
+# Drawing in software takes a processor that the console under test needs: a display of 15 Hz.
+_SLOW_DISPLAY = """
+window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 66);
+window.cancelAnimationFrame = clearTimeout;
+"""
 _STATE = "() => window.keyhole?.state ?? null"
 _SCENE = "const scene = document.getElementById('scene').contentWindow.__viserMutable;"
 _HAS_GIZMO = f"""() => {{
@@ -43,6 +54,11 @@ _PIXEL = f"""(local) => {{
     outer.top + inner.top + ((1 - point.y) / 2) * inner.height,
   ];
 }}"""
+# What the scene says when the mouse takes the gizmo, and nothing of its end.
+_TAKE = f"""() => {{
+  {_SCENE}
+  scene.sendMessage({{ type: "TransformControlsDragStartMessage", name: "/gizmo", owner: "" }});
+}}"""
 # The gizmo paints what the mouse would take yellow; its first three lines are the arrows.
 _LIT = f"""() => {{
   {_SCENE}
@@ -54,6 +70,10 @@ _LIT = f"""() => {{
 }}"""
 _SCENE_BOX = "() => document.getElementById('scene').getBoundingClientRect().toJSON()"
 _FOCUSED = "() => document.activeElement.id"
+
+
+class Stalled(AssertionError):
+    """The browser was silent while it led, or the machine stood: the robot is rightly paused."""
 
 
 class ConsolePage:
@@ -71,6 +91,7 @@ class ConsolePage:
         self.context, self.console = context, console
         self.robot = "instrument"
         self.page = context.new_page()
+        self.page.add_init_script(_SLOW_DISPLAY)
         self.page.goto(f"{console.base}/?token={console.token}")
         # The token leaves the address bar, and whatever else stood there with it.
         self.page.goto(f"{console.base}/?fixedDpr=0.25")
@@ -117,6 +138,8 @@ class ConsolePage:
         """Enable by the button."""
         if self.state()["safety"]["state"] != "ENABLED":
             self.button("Enable").click()
+        # A page that draws slowly may still show the time before it was paused.
+        eventually(lambda: self.state()["safety"]["state"] == "ENABLED", "enabled", SLOW_S)
         self.until("ENABLED")
 
     def settle(self) -> None:
@@ -186,6 +209,40 @@ class ConsolePage:
         finally:
             if not self.page.is_closed():
                 self.page.mouse.up()
+
+    def take_and_forget(self) -> None:
+        """The scene takes the gizmo, and never says that it lets it go."""
+        self.page.evaluate(_TAKE)
+
+    def leading(self) -> JSON:
+        """The newest state of a robot that must be enabled.
+
+        Raises:
+            Stalled: it was paused because this browser was silent, or a tick late.
+        """
+        state = self.state()
+        if state["safety"]["reason_code"] in STALLS:
+            raise Stalled(state["safety"]["reason"])
+        assert state["safety"]["state"] == "ENABLED", state["safety"]
+        return state
+
+    def despite_stalls(self, drive: Callable[[], Driven]) -> Driven:
+        """What ``drive`` returns, which is begun anew where the browser stalled in it.
+
+        A browser that draws in software may stall for longer than a leader may be silent.
+        """
+        for _ in range(DRIVES - 1):
+            try:
+                return drive()
+            except Stalled:
+                self.enable()
+                eventually(self.gizmo_is_at_the_tip, "the gizmo is put back", SLOW_S)
+        return drive()
+
+    def gizmo_is_at_the_tip(self) -> bool:
+        """Whether this browser draws the gizmo where the robot's tip is."""
+        tip = self.state()["true"]["position_mm"]
+        return bool(np.allclose(self.gizmo_mm(), tip, atol=0.2))
 
     def focus_scene(self) -> None:
         """Click beside the robot, so that the scene has the keyboard."""

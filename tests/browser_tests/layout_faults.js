@@ -3,6 +3,8 @@
   const SLACK_PX = 1.5;
   const OVERLAP_PX = 3;
   const faults = [];
+  // A colour on its way to another one is nobody's choice.
+  document.getAnimations().forEach((animation) => animation.finish());
 
   const words = (element) => {
     const text = (element.getAttribute("aria-label") ?? element.textContent).trim().replace(/\s+/g, " ");

@@ -37,6 +37,18 @@ def hold(page: ConsolePage, *, held: bool, right: float = 0.0, down: float = 0.0
     page.page.evaluate(_HOLD, [[right, down, 0.0, 0.0], held])
 
 
+def press(page: ConsolePage, *, down: float = 0.0) -> None:
+    """Let the shoulder button go, so that the page sees it, and press it anew."""
+    # A press counts if the page has seen it begin: it looks once in every drawn picture.
+    hold(page, held=False)
+    page.page.wait_for_timeout(_SEEN_MS)
+    if page.state()["safety"]["state"] == "PAUSED":
+        # A browser that draws in software stalls; a silent leader rightly pauses the robot.
+        page.enable()
+    hold(page, held=True, down=down)
+    page.page.wait_for_timeout(_SEEN_MS)
+
+
 def test_a_gamepad_moves_the_tip_while_a_button_is_held(
     gamepad: ConsolePage, console: ConsoleProcess
 ) -> None:
@@ -44,17 +56,12 @@ def test_a_gamepad_moves_the_tip_while_a_button_is_held(
     start = np.array(console.state()["true"]["position_mm"])
 
     def moved() -> float:
-        state = console.state()
-        if state["safety"]["state"] == "PAUSED":
-            # A browser that draws in software stalls; a silent leader rightly pauses the robot.
-            hold(gamepad, held=False)
-            eventually(lambda: not console.state()["engaged"], "let go", SLOW_S)
-            gamepad.enable()
-        hold(gamepad, held=True, down=-1.0)
-        return float((np.array(state["true"]["position_mm"]) - start)[1])
+        if not console.state()["engaged"]:
+            press(gamepad, down=-0.6)
+        return float((np.array(console.state()["true"]["position_mm"]) - start)[1])
 
     eventually(lambda: moved() > 3.0, "the stick pushed up leads the tip along y", SLOW_S)
-    hold(gamepad, held=False, down=-1.0)
+    hold(gamepad, held=False, down=-0.6)
     eventually(lambda: not console.state()["engaged"], "the clutch opens", SLOW_S)
     way = np.array(console.state()["true"]["position_mm"]) - start
     assert np.linalg.norm(way[[0, 2]]) < 0.5
@@ -64,11 +71,7 @@ def test_a_gamepad_that_is_unplugged_while_it_leads_pauses(
     gamepad: ConsolePage, console: ConsoleProcess
 ) -> None:
     def leads_or_stalled() -> bool:
-        # A press counts if the page has seen it begin: it looks once in every drawn picture.
-        hold(gamepad, held=False)
-        gamepad.page.wait_for_timeout(_SEEN_MS)
-        hold(gamepad, held=True)
-        gamepad.page.wait_for_timeout(_SEEN_MS)
+        press(gamepad)
         state = console.state()
         return bool(state["leader"] == "gamepad" or state["safety"]["state"] == "PAUSED")
 

@@ -26,8 +26,12 @@ def test_the_button_records_a_session_that_verifies(
     expect(stop).to_have_attribute("aria-pressed", "true", timeout=SLOW_S * 1e3)
     eventually(lambda: operator.shown()["recording"], "the state says so", SLOW_S)
     expect(page.locator("#recording")).to_contain_text("● 0:0")
-    with operator.pulling(0, 4.0):
-        eventually(lambda: operator.shown()["engaged"], "the gizmo leads", SLOW_S)
+
+    def lead() -> None:
+        with operator.pulling(0, 4.0):
+            eventually(lambda: operator.leading()["engaged"], "the gizmo leads", SLOW_S)
+
+    operator.despite_stalls(lead)
     path = Path(console.call("GET", "/api/v1/robots/instrument/recording")["file"])
     page.keyboard.press("l")
     eventually(lambda: not operator.shown()["recording"], "it has ended", SLOW_S)

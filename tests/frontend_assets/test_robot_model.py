@@ -13,6 +13,8 @@ import trimesh
 from numpy.typing import NDArray
 
 from frontend_assets.robot_model import build, ensure_model
+from frontend_assets.robot_model.glb import glb_bytes, mesh_of
+from frontend_assets.robot_model.instrument_module import instrument_module, shaft
 from frontend_assets.robot_model.viewing import disk_mesh, load_urdf
 from robot.configuration import Configuration, parse
 from robot.urdf import ARM_MESHES, MODULE_MESHES, SHAFT_MESHES, urdf_text
@@ -44,6 +46,21 @@ def configuration() -> Configuration:
 @pytest.fixture(scope="module")
 def rebuilt(configuration: Configuration) -> dict[str, bytes]:
     return build.mesh_files(configuration)
+
+
+@pytest.fixture(scope="module")
+def other() -> Configuration:
+    """Another shaft, on another side of the same arm."""
+    changed = table()
+    changed["instrument"]["shaft_length_m"] = 0.180
+    changed["module"] |= {"shaft_base_m": [0.0, 0.05, 0.120], "shaft_direction": [0.0, 1.0, 0.0]}
+    return parse(changed, "other.toml")
+
+
+@pytest.fixture(scope="module")
+def cached(other: Configuration, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the model of the other geometry was built, alone in its cache."""
+    return ensure_model(other, tmp_path_factory.mktemp("models"))
 
 
 def mesh(name: str, folder: Path = build.FOLDER) -> trimesh.Trimesh:
@@ -79,9 +96,19 @@ def test_committed_meshes_are_what_the_code_gives(
 
 
 def test_a_second_build_gives_the_same_bytes(
-    configuration: Configuration, rebuilt: dict[str, bytes]
+    configuration: Configuration, rebuilt: dict[str, bytes], cached: Path
 ) -> None:
-    assert build.mesh_files(configuration) == rebuilt
+    """The links depend on no configuration: building the other geometry has built them again."""
+    links = [name for names in ARM_MESHES for name in names]
+    again = {name: (cached / "meshes" / f"{name}.glb").read_bytes() for name in links}
+    for names, parts in (
+        (MODULE_MESHES, instrument_module(configuration.module)),
+        (SHAFT_MESHES, shaft(configuration.instrument)),
+    ):
+        for name in names:
+            material = name.rpartition("_")[2]
+            again[name] = glb_bytes(mesh_of(parts[material], material), name)
+    assert again == rebuilt
 
 
 @pytest.mark.parametrize("index", range(8))
@@ -151,16 +178,10 @@ def test_default_geometry_needs_no_build(configuration: Configuration, tmp_path:
     assert not list(tmp_path.iterdir())
 
 
-def test_other_geometry_is_built_once_into_the_cache(tmp_path: Path) -> None:
-    changed = table()
-    changed["instrument"]["shaft_length_m"] = 0.180
-    changed["module"] |= {"shaft_base_m": [0.0, 0.05, 0.120], "shaft_direction": [0.0, 1.0, 0.0]}
-    other = parse(changed, "other.toml")
-    folder = ensure_model(other, tmp_path)
-    assert folder.parent == tmp_path
-    assert (folder / build.URDF_NAME).read_text("utf-8") == urdf_text(other)
-    written = (folder / build.STAMP_NAME).stat().st_mtime_ns
-    assert ensure_model(other, tmp_path) == folder
-    assert (folder / build.STAMP_NAME).stat().st_mtime_ns == written
-    assert [path.name for path in tmp_path.iterdir()] == [folder.name]
-    assert mesh("shaft_metal", folder).bounds[1][2] == pytest.approx(0.180, abs=1e-6)
+def test_other_geometry_is_built_once_into_the_cache(other: Configuration, cached: Path) -> None:
+    assert (cached / build.URDF_NAME).read_text("utf-8") == urdf_text(other)
+    written = (cached / build.STAMP_NAME).stat().st_mtime_ns
+    assert ensure_model(other, cached.parent) == cached
+    assert (cached / build.STAMP_NAME).stat().st_mtime_ns == written
+    assert [path.name for path in cached.parent.iterdir()] == [cached.name]
+    assert mesh("shaft_metal", cached).bounds[1][2] == pytest.approx(0.180, abs=1e-6)

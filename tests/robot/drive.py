@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from robot.configuration import Configuration
 from robot.instrument_robot import InstrumentRobot
 from robot.records import INPUT, OUTCOME, LeaderKind, Request, Safety
 from robot.tendons import servo_angles
@@ -21,6 +22,12 @@ def wxyz(rotation: Rotation) -> np.ndarray:
 def random_rotation(rng: np.random.Generator) -> Rotation:
     """Uniformly distributed."""
     return Rotation.from_quat(rng.normal(size=4))
+
+
+def with_steady_cells(configuration: Configuration) -> Configuration:
+    """For torque cells without noise, whose readings may stay as they are."""
+    unit = configuration.tension_unit.model_copy(update={"cell_flat_ms": 0.0})
+    return configuration.model_copy(update={"tension_unit": unit})
 
 
 class Drive:

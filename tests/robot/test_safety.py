@@ -54,6 +54,8 @@ EXPECTED: dict[Event, dict[Safety, Safety]] = {
     Event.CONTROL_LATE: {E: P},
     Event.NEAR_SNAPPING: {E: P},
     Event.RELATIVE_ERROR: {E: P},
+    Event.TENSION_UNKNOWN: {E: P},
+    Event.TENDON_RUNS: {E: F, P: F},
 }
 EVERYTHING = list(itertools.product(Safety, Event))
 

@@ -53,6 +53,7 @@ def test_they_have_the_names_and_durations_of_the_command_line(
         "silicon-sine": 20.0,
         "silicon-arc": 20.0,
         "ring-board": 72.0,
+        "ring-press": 32.5,
     }
 
 

@@ -1,4 +1,4 @@
-"""Trocar, withdrawal, boards, compensation over the API, on a real console of their own."""
+"""Trocar, withdrawal, boards, compensation, sensing over the API, on a console of their own."""
 
 from __future__ import annotations
 
@@ -168,6 +168,39 @@ def test_compensation_and_tracker_are_chosen_apart(operator: ApiClient) -> None:
     assert operator.refused("PUT", "/compensation", {"mode": "most"})["code"] == "invalid_request"
 
 
+def test_sensing_is_switched_and_says_why_it_senses_nothing(operator: ApiClient) -> None:
+    state = operator.done("PUT", "/sensing", {"enabled": False})
+    assert (state["sensing"]["enabled"], state["sensing"]["fault"]) == (False, "off")
+    state = operator.done("PUT", "/sensing", {"enabled": True})
+    found = operator.done("GET", "/sensing")
+    assert found == state["sensing"]
+    assert (found["enabled"], found["valid"]) == (True, False)
+    # The kinematic robot has no tension cells.
+    assert (found["fault"], found["cells"]) == ("no_tension_cells", False)
+    assert found["action"]
+    assert state["tension_n"] == [None] * 4
+    for body in ({}, {"enabled": 1}, {"enabled": True, "more": 1}):
+        assert operator.refused("PUT", "/sensing", body)["code"] == "invalid_request"
+
+
+def test_tendons_hold_tensions_only_where_they_are_measured(operator: ApiClient) -> None:
+    state = operator.done("PUT", "/tendons", {"control": "position", "co_contraction_n": 4.5})
+    assert (state["tendons"]["control"], state["tendons"]["co_contraction_n"]) == ("position", 4.5)
+    assert (
+        operator.done("PUT", "/tendons", {"co_contraction_n": 2.0})["tendons"]["holds"]
+        == ["position"] * 4
+    )
+    for control in ("hybrid", "tension"):
+        refusal = operator.refused("PUT", "/tendons", {"control": control})
+        assert (refusal["code"], refusal["status"]) == ("tensions_not_measured", 409)
+        assert "--actuation tension-unit" in refusal["detail"]
+    for body in ({"control": "soft"}, {"co_contraction_n": 0.0}, {"co_contraction_n": "2"}):
+        assert operator.refused("PUT", "/tendons", body)["code"] == "invalid_request"
+    state = operator.done("GET", "/state")["tendons"]
+    assert (state["control"], state["co_contraction_n"]) == ("position", 2.0)
+    assert (state["wanted_n"], state["stiffness_mnm_rad"]) == ([None] * 4, [None] * 2)
+
+
 @pytest.mark.parametrize(
     ("method", "path", "body"),
     [
@@ -176,6 +209,8 @@ def test_compensation_and_tracker_are_chosen_apart(operator: ApiClient) -> None:
         ("POST", "/withdraw", None),
         ("PUT", "/board", {"name": "none"}),
         ("PUT", "/compensation", {"mode": "off"}),
+        ("PUT", "/sensing", {"enabled": False}),
+        ("PUT", "/tendons", {"control": "position"}),
     ],
 )
 def test_only_the_operator_may(

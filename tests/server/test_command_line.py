@@ -89,7 +89,8 @@ def test_the_command_line_replaces_what_the_configuration_says(
     started: list[argparse.Namespace],
 ) -> None:
     assert main(["--plant", "kinematic", "--seed", "7", "--tracker", "on"]) == 0
-    assert main(["--preset", "harsh", "--board", "none", "--compensation", "gain"]) == 0
+    wanted = ["--preset", "harsh", "--board", "none", "--compensation", "gain"]
+    assert main([*wanted, "--actuation", "tension-unit"]) == 0
     file = load()
     first, second = (console_command.configured(file, arguments) for arguments in started)
     assert (first.simulation.plant, first.simulation.seed) == ("kinematic", 7)
@@ -97,6 +98,8 @@ def test_the_command_line_replaces_what_the_configuration_says(
     assert first.simulation.preset == file.simulation.preset
     assert (second.simulation.preset, second.simulation.board) == ("harsh", "none")
     assert second.compensation.mode == "gain"
+    assert second.simulation.actuation == "tension-unit"
+    assert first.simulation.actuation == "servos"
     assert second.tracker == file.tracker
     assert type(first).model_validate(first.model_dump()) == first
 

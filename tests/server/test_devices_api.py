@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from hardware.devices import DEVICES, DeviceState
-from hardware.faulty_plant import FAULTS
+from hardware.faulty_plant import plant_faults
 from robot.clearance import PART_NAMES, Part
 from robot.records import RECORD, Readiness
+from server.configuration_file import load
 from server.web.device_schema import ClearancePart, DevicesPart, ReadinessPart
 from server.web.devices_view import READINESS, clearance_view, devices_view, readiness_view
 from tests.server.api_client import ApiClient
@@ -82,7 +83,9 @@ def test_a_robot_that_is_not_ready_is_not_enabled(operator: ApiClient) -> None:
 
 def test_faults_are_listed_injected_and_cleared(driver: ApiClient, watcher: ApiClient) -> None:
     listed = {one["name"]: one["title"] for one in driver.http.get("/faults").json()}
-    assert listed == {name: fault.title for name, fault in FAULTS.items()}
+    assert listed == {name: fault.title for name, fault in plant_faults(load()).items()}
+    # There is no tension-feedback unit that could break.
+    assert "tendon-broken" not in listed
     assert watcher.refused("POST", "/faults", {"name": "contact"})["code"] == "not_the_operator"
     assert driver.refused("POST", "/faults", {"name": "gremlins"})["status"] == 404
     driver.done("POST", "/faults", {"name": "servo-silent"})

@@ -16,6 +16,7 @@ from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 
 from robot.records import RECORD
+from robot.sensing.faults import SensingFault
 from server.configuration_file import load
 from server.recording.channels import RATE_HZ, json_channels
 from server.recording.errors import NotARecording, RecordingEmpty, RecordingNotWritten
@@ -56,6 +57,7 @@ def test_every_bit_pattern_comes_back(tmp_path: Path, rng: np.random.Generator) 
     noise["header"]["time_ns"] = np.arange(300) * 2_000_000
     noise["outcome"]["state"]["safety"] = noise["outcome"]["state"]["reason"] = 0
     noise["outcome"]["state"]["leader_kind"] = noise["truth"]["source"] = 0
+    noise["outcome"]["report"]["estimate_fault"] = 0
     with np.errstate(all="ignore"):
         write(tmp_path / "noise.mcap", noise)
     assert contents(tmp_path / "noise.mcap").tobytes() == noise.tobytes()
@@ -163,6 +165,40 @@ def test_what_is_not_a_number_is_null(tmp_path: Path) -> None:
     with (tmp_path / "nan.mcap").open("rb") as file:
         ((_, _, message),) = make_reader(file).iter_messages(topics=["/errors"])
     assert json.loads(message.data)["position_mm"] is None
+
+
+def test_an_estimate_is_told_where_there_is_one(tmp_path: Path) -> None:
+    records = recorded_run()[:1].copy()
+    report, tick_input = records["outcome"]["report"][0], records["input"][0]
+    report["estimate_fault"], report["estimate_force"] = SensingFault.NONE, (0.1, 0.0, -0.2)
+    report["estimate_wxyz"] = (1.0, 0.0, 0.0, 0.0)
+    tick_input["tension_cells"], tick_input["measured_tension"] = 1, (1.0, np.nan, 2.0, 3.0)
+    command = records["outcome"]["command"][0]
+    command["tendon_mode"], command["tension"] = (0, 1, 0, 0), (3.0, 2.5, 3.0, 3.0)
+    records["truth"]["contact_wrench"] = (0.11, 0.0, -0.2, 0.0, 0.0, 0.0)
+
+    def told(name: str) -> dict[str, Any]:
+        write(tmp_path / name, records)
+        with (tmp_path / name).open("rb") as file:
+            found = make_reader(file).iter_messages()
+            return {channel.topic: message.data for _, channel, message in found}
+
+    valid = told("valid.mcap")
+    sensing = json.loads(valid["/sensing"])
+    assert (sensing["valid"], sensing["fault"]) == (True, "none")
+    assert (sensing["force_n"], sensing["true_force_n"]) == ([0.1, 0.0, -0.2], [0.11, 0.0, -0.2])
+    assert json.loads(valid["/forces"])["tension_n"] == [1.0, None, 2.0, 3.0]
+    assert json.loads(valid["/forces"])["tension_wanted_n"] == [None, 2.5, None, None]
+    assert json.loads(valid["/tip/estimated"])["pose"]["orientation"]["w"] == 1.0
+
+    report["estimate_fault"] = SensingFault.NO_TENSION_CELLS
+    tick_input["tension_cells"] = 0
+    missing = told("missing.mcap")
+    sensing = json.loads(missing["/sensing"])
+    assert (sensing["valid"], sensing["fault"]) == (False, "no_tension_cells")
+    assert sensing["force_n"] == [None] * 3
+    assert json.loads(missing["/forces"])["tension_n"] == [None] * 4
+    assert json.loads(missing["/tip/estimated"])["pose"]["position"]["x"] is None
 
 
 def test_chunks_are_short(path: Path) -> None:

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from hardware.kinematic_plant import KinematicPlant
 from hardware.plant import Measurement
 from scenes.experiments import experiment, names
+from scenes.experiments.sensing import TITLES as SENSING
 from scenes.experiments.tubes import TITLES
 from server.command_line import main
 from server.configuration_file import load
@@ -155,7 +156,7 @@ def test_equal_runs_leave_equal_traces(tmp_path: Path, short: str) -> None:
 def test_the_list_has_every_experiment(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "--list"]) == 0
     listed = capsys.readouterr().out.splitlines()
-    expected = ["instrument:", *names(), "concentric:", *TITLES]
+    expected = ["instrument:", *names(), "sensing:", *SENSING, "concentric:", *TITLES]
     assert [line.split()[0] for line in listed] == expected
 
 
@@ -295,6 +296,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["run", "circle", "--coordinates", "xy"], "invalid choice: 'xy'"),
         (["run", "circle", "--plant", "steam"], "invalid choice: 'steam'"),
         (["run", "circle", "--preset", "shiny"], "invalid choice: 'shiny'"),
+        (["run", "circle", "--actuation", "steam"], "invalid choice: 'steam'"),
         (["run", "circle", "--compensation", "half"], "invalid choice: 'half'"),
         (["run", "circle", "--tracker", "maybe"], "invalid choice: 'maybe'"),
         (["run", "circle", "--board", "chess"], "invalid choice: 'chess'"),
@@ -367,3 +369,19 @@ def test_the_program_itself_refuses_without_a_traceback(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout) == (2, "")
     expected = f"keyhole: {file}, line 3, column z_mm: inf is not a finite number\n"
     assert done.stderr == expected
+
+
+def test_tendons_hold_tensions_where_the_unit_measures_them(
+    short: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ["run", "--path", short, "--tendons", "hybrid", "--co-contraction", "2.5"]
+    assert main(asked) == 2
+    assert "hybrid control needs a robot that measures" in capsys.readouterr().err
+    file = tmp_path / "held.json"
+    assert main([*asked, "--actuation", "tension-unit", "--json", str(file)]) == 0
+    assert "tension unit, hybrid control, 2.5 N at least" in capsys.readouterr().out
+    found = json.loads(file.read_text())
+    assert found["actuation"] == "tension-unit"
+    assert found["tendons"] == {"control": "hybrid", "co_contraction_n": 2.5}
+    assert main([*asked[:-1], "9", "--actuation", "tension-unit"]) == 2
+    assert "at most 8.44 N" in capsys.readouterr().err

@@ -21,7 +21,7 @@ SHAFT = np.array([0.6, 0.0, -0.8])
 
 def there_and_back(reach: list[float], name: str) -> Path:
     """Straight to a point, a rest, and back."""
-    return headless.path([[0, 0, 0, 0], [6, *reach], [8, *reach], [14, 0, 0, 0]], name)
+    return headless.path([[0, 0, 0, 0], [6, *reach], [7, *reach], [13, 0, 0, 0]], name)
 
 
 def roll() -> Path:
@@ -39,10 +39,10 @@ PATHS = {
     "behind the trocar": headless.path(
         [
             [0, 0, 0, 0],
-            [4, -0.109, 0, 0.122],
-            [8, -0.2, 0, 0.25],
-            [9, -0.2, 0, 0.25],
-            [17, 0, 0, 0],
+            [3, -0.109, 0, 0.122],
+            [6, -0.2, 0, 0.25],
+            [6.5, -0.2, 0, 0.25],
+            [12, 0, 0, 0],
         ],
         "behind the trocar",
     ),
@@ -142,7 +142,7 @@ def test_beyond_reach_the_tip_goes_all_the_way_that_shaft_and_segment_allow(
     longest = (
         1.0 - limits.lambda_min - 1e-4
     ) * instrument.shaft_length_m + instrument.segment_length_m
-    index = round(7.9 / DT)
+    index = round(6.9 / DT)
     row = run.result.trace[index]
     expected = np.linalg.norm(row[18:21] - row[25:28]) - longest
     missing = run.result.errors[index, 0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,9 +26,11 @@ PATH = headless.path([[0, 0, 0, 0], [0.2, 0.001, 0, 0], [0.5, 0, 0, 0]], "short"
 def test_options_replace_what_they_name_and_leave_the_rest() -> None:
     configuration = headless.configuration()
     options = RunOptions("x", PATH, "2", "hqp", "uv", preset="harsh", seed=7, tracker=True)
+    options = replace(options, actuation="tension-unit")
     applied = options.applied(configuration)
     assert applied.simulation.preset == "harsh"
     assert applied.simulation.seed == 7
+    assert applied.simulation.actuation == "tension-unit"
     assert applied.tracker.enabled
     assert applied.priority.case == "2"
     assert applied.simulation.plant == configuration.simulation.plant
@@ -53,6 +56,7 @@ def test_an_experiment_brings_its_board_and_locks_its_arm(name: str) -> None:
         ({"case": "3"}, "priority case '3'"),
         ({"preset": "shiny"}, "preset 'shiny'"),
         ({"plant": "steam"}, "plant 'steam'"),
+        ({"actuation": "steam"}, "actuation 'steam'"),
         ({"compensation": "half"}, "compensation 'half'"),
     ],
 )

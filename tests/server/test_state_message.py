@@ -161,7 +161,7 @@ def test_what_is_touched_and_done_on_a_board(messages: StateMessages, record: ND
     truth["contact_count"], tick_input["measured_contact"] = 3, 0.75
     truth["rings_passed"], truth["rings_touched"] = 0b1011, 0b100
     truth["ball_progress"] = 0.5
-    tick_input["measured_tension"] = (1.0, 2.0, 3.0, 4.0)
+    tick_input["tension_cells"], tick_input["measured_tension"] = 1, (1.0, 2.0, 3.0, 4.0)
     found = {}
     for board in ("none", "ring-board", "silicon-arc"):
         found[board] = messages.message(record, replace(RUNNING, board=board), NOBODY)

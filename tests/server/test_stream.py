@@ -164,7 +164,7 @@ def test_missing_heartbeats_pause(driver: ApiClient) -> None:
 
 def test_renewing_over_the_stream_keeps_the_lease(operator: ApiClient) -> None:
     with operator.stream() as stream:
-        for _ in range(14):
+        for _ in range(12):
             send(stream, type="renew")
             time.sleep(0.5)
         assert operator.state()["operator"]["you"] is True
@@ -210,10 +210,10 @@ def test_progress_knows_who_is_behind() -> None:
 
 
 def test_a_client_that_stops_reading_gets_no_backlog(watcher: ApiClient) -> None:
-    """After 6 s of 60 states a second unread, the newest state is only a little reading away."""
+    """After 4 s of 60 states a second unread, the newest state is only a little reading away."""
     with watcher.stream("?rate_hz=60") as stream:
         send(stream, type="heartbeat", tick=newest(stream)["tick"])
-        time.sleep(6.0)
+        time.sleep(4.0)
         now = watcher.state()["tick"]
         ticks: list[int] = []
         while not ticks or ticks[-1] < now:
@@ -221,7 +221,7 @@ def test_a_client_that_stops_reading_gets_no_backlog(watcher: ApiClient) -> None
             ticks.append(state["tick"])
             send(stream, type="heartbeat", tick=state["tick"])
     assert len(ticks) <= 70, "at most what is sent in the second that it may be behind"
-    assert max(np.diff(ticks)) > 1500, "the states in between were never sent"
+    assert max(np.diff(ticks)) > 1000, "the states in between were never sent"
 
 
 def test_a_stuck_client_does_not_hold_up_the_others(watcher: ApiClient) -> None:

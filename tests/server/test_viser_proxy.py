@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import re
 import socket
@@ -246,6 +247,21 @@ def test_a_watchers_gizmo_moves_nothing(driver: ApiClient, watcher: ApiClient) -
     assert (after["engaged"], after["leader"]) == (False, "none")
     log = driver.http.get("/audit", params={"last": 200}).json()
     assert any("tried to drag the gizmo" in entry["text"] for entry in log)
+
+
+def test_a_button_that_came_up_ends_a_drag_whose_end_got_lost(
+    scene: Scene, driver: ApiClient
+) -> None:
+    dragged(scene, driver.state(), 3)
+    driver.until(lambda s: s["engaged"], "dragging")
+    with driver.stream() as stream:
+        stream.send(json.dumps({"type": "let-go"}))
+        driver.until(lambda s: not s["engaged"], "let go")
+        scene.send(END)
+        dragged(scene, driver.state(), 3)
+        assert driver.until(lambda s: s["engaged"], "dragged again")["leader"] == "gizmo"
+        scene.send(END)
+        driver.until(lambda s: not s["engaged"], "let go again")
 
 
 def test_closing_the_scene_mid_drag_lets_go(scene: Scene, driver: ApiClient) -> None:

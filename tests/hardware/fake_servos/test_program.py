@@ -28,6 +28,30 @@ from tests.hardware.fake_servos.wire_host import IDS
 
 PING = instruction_packet(101, Instruction.PING)
 HANDLER = PacketHandler(2.0)
+PATIENT_MS = 2000.0
+"""What an answer may take: the machine may be busy, and the vendor's library waits for 34 ms."""
+
+
+class PatientPort(PortHandler):  # type: ignore[misc] # the library has no types
+    """The vendor's port with a longer wait for answers.
+
+    Attributes:
+        patience_ms: how much longer.
+    """
+
+    patience_ms = PATIENT_MS
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        super().setPacketTimeout(packet_length)
+        self.packet_timeout += self.patience_ms
+
+
+def _nothing_comes(port: PatientPort, servo: int) -> bool:
+    """Whether a ping has no answer in the vendor's own time."""
+    port.patience_ms = 0.0
+    result = HANDLER.ping(port, servo)[1]
+    port.patience_ms = PATIENT_MS
+    return bool(result == COMM_RX_TIMEOUT)
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +69,8 @@ def fake(process: FakeServosProcess) -> Iterator[FakeServos]:
 
 
 @pytest.fixture
-def port(fake: FakeServos) -> Iterator[PortHandler]:
-    opened = PortHandler(str(fake.link))
+def port(fake: FakeServos) -> Iterator[PatientPort]:
+    opened = PatientPort(str(fake.link))
     assert opened.openPort()
     yield opened
     opened.closePort()
@@ -69,9 +93,9 @@ def _open(path: Path) -> int:
     return descriptor
 
 
-def test_the_vendors_library_pings_reads_and_writes(port: PortHandler) -> None:
+def test_the_vendors_library_pings_reads_and_writes(port: PatientPort) -> None:
     assert HANDLER.ping(port, 101) == (1060, COMM_SUCCESS, 0)
-    assert HANDLER.ping(port, 42)[1] == COMM_RX_TIMEOUT
+    assert _nothing_comes(port, 42)
     assert HANDLER.write1ByteTxRx(port, 102, 9, 10) == (COMM_SUCCESS, 0)
     assert HANDLER.read1ByteTxRx(port, 102, 9) == (10, COMM_SUCCESS, 0)
     assert HANDLER.write4ByteTxRx(port, 103, 116, 9999) == (COMM_SUCCESS, 6)
@@ -81,7 +105,7 @@ def test_the_vendors_library_pings_reads_and_writes(port: PortHandler) -> None:
     assert HANDLER.action(port, 104) == COMM_SUCCESS
 
 
-def test_the_vendors_library_finds_everybody(port: PortHandler) -> None:
+def test_the_vendors_library_finds_everybody(port: PatientPort) -> None:
     found, result = HANDLER.broadcastPing(port)
     assert result == COMM_SUCCESS
     assert found == {servo: [1060, 46] for servo in IDS}
@@ -89,7 +113,7 @@ def test_the_vendors_library_finds_everybody(port: PortHandler) -> None:
 
 @pytest.mark.parametrize("read", ["txRxPacket", "fastSyncRead"])
 def test_the_vendors_library_drives_all_at_once(
-    port: PortHandler, fake: FakeServos, read: str
+    port: PatientPort, fake: FakeServos, read: str
 ) -> None:
     for servo in IDS:
         assert HANDLER.write1ByteTxRx(port, servo, 64, 1) == (COMM_SUCCESS, 0)
@@ -122,9 +146,9 @@ def test_the_vendors_library_drives_all_at_once(
         HANDLER.write1ByteTxRx(port, servo, 64, 0)
 
 
-def test_at_another_speed_the_vendors_library_hears_nothing(port: PortHandler) -> None:
+def test_at_another_speed_the_vendors_library_hears_nothing(port: PatientPort) -> None:
     port.setBaudRate(57_600)
-    assert HANDLER.ping(port, 101)[1] == COMM_RX_TIMEOUT
+    assert _nothing_comes(port, 101)
     port.setBaudRate(1_000_000)
     assert HANDLER.ping(port, 101)[1] == COMM_SUCCESS
 
@@ -165,15 +189,20 @@ def test_it_comes_back_under_another_name_by_itself(fake: FakeServos) -> None:
 @pytest.mark.parametrize(
     "name", [name for name, known in KNOWN.items() if known.kind is Kind.CONDITION]
 )
-def test_conditions_begin_and_end(fake: FakeServos, port: PortHandler, name: str) -> None:
+def test_conditions_begin_and_end(fake: FakeServos, port: PatientPort, name: str) -> None:
     fake.inject(name, servo=102)
-    assert (HANDLER.ping(port, 102)[1] == COMM_SUCCESS) == (name != "silent")
+    if name == "silent":
+        assert _nothing_comes(port, 102)
+    else:
+        assert HANDLER.ping(port, 102)[1] == COMM_SUCCESS
     (fault,) = [entry for entry in fake.state()["faults"] if not entry["over"]]
     assert (fault["name"], fault["servo"], fault["acted"]) == (name, 102, 1)
     fake.clear(name)
     assert HANDLER.ping(port, 102)[1] == COMM_SUCCESS
     assert HANDLER.reboot(port, 102)[0] == COMM_SUCCESS
-    _until(lambda: HANDLER.ping(port, 102)[1:] == (COMM_SUCCESS, 0))
+    # While it boots it is deaf.
+    _until(lambda: not _nothing_comes(port, 102))
+    assert HANDLER.ping(port, 102)[1:] == (COMM_SUCCESS, 0)
 
 
 def test_a_condition_ends_when_its_time_is_over(fake: FakeServos) -> None:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hardware.faulty_plant import FAULTS as PLANT_FAULTS
+from hardware.faulty_plant import plant_faults
+from robot.configuration import Configuration
 from robot.errors import UnknownName
 from robot.records import RECORD, Safety
 from server.configuration_file import load
@@ -18,6 +19,7 @@ from server.faults.bench import Bench
 from server.faults.fault import Fault, Finding, Group, is_met, row
 from server.faults.soak import Reader, soak_faults
 from server.faults.table import FAULTS, bench_configuration, chosen, measured
+from server.faults.tension_faults import with_tension_unit
 from server.faults.watching import after, commanded_path_mm, reach_mm, stands_still
 from tests.server.api_client import ApiClient
 from tests.server.console_process import ConsoleProcess, eventually
@@ -25,13 +27,17 @@ from tests.server.console_process import ConsoleProcess, eventually
 ON_THE_ROBOT = ("measurement-lost", "encoder-jump", "contact", "leader-teleport")
 
 
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
+def patient_configuration() -> Configuration:
+    """That of the bench, with a leader that may be late on a busy machine."""
     configuration = bench_configuration(load())
     patient = configuration.teleoperation.model_copy(update={"api_timeout_ms": 400.0})
-    configuration = configuration.model_copy(update={"teleoperation": patient})
+    return configuration.model_copy(update={"teleoperation": patient})
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     folder = tmp_path_factory.mktemp("faults")
-    with Bench(folder, configuration) as running:
+    with Bench(folder, patient_configuration()) as running:
         yield running
 
 
@@ -50,6 +56,17 @@ def test_a_fault_is_noticed_stops_all_motion_and_is_left_by_hand_only(
     assert finding.recovered
     assert finding.recovery[-1:] == ("enable",)
     json.dumps(row(fault, finding, 1.0), allow_nan=False)
+
+
+def test_a_tendon_that_breaks_while_tensions_are_held_is_noticed(tmp_path: Path) -> None:
+    (fault,) = chosen(["tendon-broken"])
+    with Bench(tmp_path, with_tension_unit(patient_configuration())) as bench:
+        found_out = measured(bench, fault)
+    assert found_out["state"] == "FAULT", found_out
+    assert found_out["commanded_travel_mm"] <= 0.1
+    assert found_out["stayed_stopped"]
+    assert found_out["recovered"]
+    assert found_out["recovery"] == "reset, then enable"
 
 
 def test_what_cannot_be_drawn_stops_nothing(bench: Bench) -> None:
@@ -104,7 +121,9 @@ def test_ways_are_measured_on_the_records() -> None:
 def test_faults_are_for_the_operator_of_a_simulated_robot(
     console: ConsoleProcess, operator: ApiClient, watcher: ApiClient
 ) -> None:
-    assert {one["name"] for one in watcher.call("GET", "/faults").json()} == set(PLANT_FAULTS)
+    assert {one["name"] for one in watcher.call("GET", "/faults").json()} == set(
+        plant_faults(load())
+    )
     watcher.refused("POST", "/faults", {"name": "contact"})
     assert operator.refused("POST", "/faults", {"name": "rust"})["code"] == "unknown_name"
     operator.done("POST", "/enable")

@@ -11,7 +11,8 @@ from robot.configuration import Stylus
 from robot.records import INSTRUMENT, LeaderKind, Safety
 from robot.rotations import exponential
 from server.leaders.control_view import SILENT_NS, ControlView
-from server.leaders.force import NO_FORCE, ONSET_S, SpringForce
+from server.leaders.force import SpringForce
+from server.leaders.led_stylus import NO_FORCE, ONSET_S
 from tests.server.leaders.conftest import ControlSide
 
 LATER = 10_000_000_000

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robot.configuration import Configuration, Stylus
+from robot.configuration import Configuration
 from robot.records import INSTRUMENT, DriveMode, Safety
+from robot.sensing.faults import SensingFault
 from server.leaders.connection import ConnectionFailed, connect
 from server.leaders.process import StylusLeader
 from server.leaders.status import StylusStatusFile
@@ -27,7 +28,9 @@ from tests.server.leaders.conftest import ControlSide
 class Bench:
     """A fake stylus, the leader process' inside in a thread, and the control side of its files."""
 
-    def __init__(self, fake: RunningStylus, control: ControlSide, configuration: Stylus) -> None:
+    def __init__(
+        self, fake: RunningStylus, control: ControlSide, configuration: Configuration
+    ) -> None:
         self.fake, self.control = fake, control
         self.leader = StylusLeader(control.directory, configuration, INSTRUMENT)
         self.status = StylusStatusFile(control.directory)
@@ -101,10 +104,16 @@ class Bench:
 
 
 @pytest.fixture
+def force_source() -> str:
+    return "spring"
+
+
+@pytest.fixture
 def bench(
-    fake: RunningStylus, control: ControlSide, configuration: Configuration
+    fake: RunningStylus, control: ControlSide, configuration: Configuration, force_source: str
 ) -> Iterator[Bench]:
     topics = {
+        "force_source": force_source,
         "url": fake.server.address,
         "pose_topic": POSES,
         "buttons_topic": BUTTONS,
@@ -113,7 +122,8 @@ def bench(
         # On a busy machine a thread may wait for long.
         "timeout_ms": 300.0,
     }
-    running = Bench(fake, control, configuration.stylus.model_copy(update=topics))
+    stylus = configuration.stylus.model_copy(update=topics)
+    running = Bench(fake, control, configuration.model_copy(update={"stylus": stylus}))
     yield running
     running.end()
 
@@ -138,6 +148,24 @@ def test_samples_go_to_control_and_forces_come_back(bench: Bench, fake: RunningS
     assert status["url"].decode() == fake.server.address
     fake.ask(release=True)
     bench.until(lambda: not bench.closed(), "the clutch opens")
+
+
+@pytest.mark.parametrize("force_source", ["sensed"])
+def test_the_sensed_force_comes_back_while_it_is_valid(bench: Bench, fake: RunningStylus) -> None:
+    report = bench.control.record["outcome"]["report"]
+    report["estimate_force"], report["estimate_force_covariance"] = (-0.3, 0.0, 0.0), 1e-6
+    report["estimate_force_covariance"] *= np.eye(3)
+    bench.lead(3)
+    bench.engaged = True
+    bench.until(lambda: fake.ask(state=True)["force_n"][0] < -0.15, "it pushes as the tissue does")
+    assert all(np.linalg.norm(f[1:]) < 0.881 for f in fake.ask(forces=True)["forces"])
+    report["estimate_fault"] = int(SensingFault.TRACKER_LOST)
+    report["estimate_force"] = 0.0
+    bench.until(lambda: fake.ask(state=True)["force_n"] == [0, 0, 0], "it fades")
+    report["estimate_fault"], report["estimate_force"] = 0, (-0.3, 0.0, 0.0)
+    bench.until(lambda: fake.ask(state=True)["force_n"][0] < -0.15, "it comes back")
+    bench.engaged = False
+    bench.until(lambda: fake.ask(state=True)["force_n"] == [0, 0, 0], "no force any more")
 
 
 def test_servo_commands_go_out_while_enabled(bench: Bench, fake: RunningStylus) -> None:

@@ -16,7 +16,7 @@ from websockets.sync.connection import Connection
 
 from robot.configuration import Configuration
 from server.fake_stylus.outlets import STYLUS_PATH, LeaseNotTaken, take_lease
-from server.leaders.force import NO_FORCE
+from server.leaders.led_stylus import NO_FORCE
 from server.memory.link import WebLink
 from server.web.lease import Lease
 from server.web.refusals import NotReady, UnreadableRequest

@@ -74,8 +74,8 @@ def wait_for(words: str, met: Any) -> None:
 
 @contextlib.contextmanager
 def long_study(folder: Path) -> Iterator[subprocess.Popen[str]]:
-    """A study of 24 runs in a process of its own; something of it is already finished."""
-    arguments = [*TINY, "--seconds", "1", "--seeds", "1-6", "--jobs", "2", "--out", str(folder)]
+    """A study of 12 runs in a process of its own; something of it is already finished."""
+    arguments = [*TINY, "--seconds", "1", "--seeds", "1-3", "--jobs", "2", "--out", str(folder)]
     process = subprocess.Popen(
         module_command("server.command_line", arguments),
         env=module_environment(),
@@ -109,17 +109,17 @@ def test_a_killed_study_leaves_nobody_behind_and_goes_on_where_it_was(
     assert workers
     wait_for("the end of the workers", lambda: not any(runs_on(pid) for pid in workers))
     before = {path: path.stat().st_mtime_ns for path in folder.glob("*.json")}
-    assert 2 <= len(before) < 24
+    assert 2 <= len(before) < 12
     broken = min(before)
     broken.write_text('{"ended": "comp')
-    again = [*TINY, "--seconds", "1", "--seeds", "1-6", "--out", str(folder)]
+    again = [*TINY, "--seconds", "1", "--seeds", "1-3", "--out", str(folder)]
     assert main(again) == 0
-    assert f"{len(before) - 1} of 24 runs were finished before" in capsys.readouterr().err
+    assert f"{len(before) - 1} of 12 runs were finished before" in capsys.readouterr().err
     after = {path: path.stat().st_mtime_ns for path in folder.glob("*.json")}
-    assert len(after) == 24
+    assert len(after) == 12
     assert all(after[path] == stamp for path, stamp in before.items() if path != broken)
     assert all(document["ended"] == "completed" for document in documents(folder).values())
-    assert (folder / "table.csv").read_text().count("completed") == 24
+    assert (folder / "table.csv").read_text().count("completed") == 12
     assert main(again) == 0
     assert {path: path.stat().st_mtime_ns for path in folder.glob("*.json")} == after
 
@@ -132,10 +132,10 @@ def test_an_interrupted_study_ends_in_order(tmp_path: Path) -> None:
         output, complaint = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
     assert "Traceback" not in complaint
-    assert "of 24 runs are finished; the same command goes on with the rest" in output
+    assert "of 12 runs are finished; the same command goes on with the rest" in output
     wait_for("the end of the workers", lambda: not any(runs_on(pid) for pid in workers))
     finished = documents(folder)
-    assert 2 <= len(finished) < 24
+    assert 2 <= len(finished) < 12
     assert (folder / "table.csv").read_text().count("completed") == len(finished)
     assert not [path for path in folder.iterdir() if path.name.startswith(".")]
 

@@ -1,0 +1,1 @@
+"""The tension-feedback unit of paper 3, simulated: motors, gears, pulleys, torque cells."""
