@@ -16,6 +16,7 @@ BENCHMARKS = {
     "plant": ("benchmarks.plant", "the simulated robot beside its bare engine"),
     "hardware": ("benchmarks.hardware", "servo bus and stylus, from the hand to the servos"),
     "tubes": ("benchmarks.tubes", "concentric tubes beside a general solver, and a whole tick"),
+    "sensing": ("benchmarks.sensing", "shape and force beside scipy and beside paper 3's way"),
     "loop": ("benchmarks.loop_lateness", "lateness of the control process beside an empty loop"),
 }
 """Names, modules with ``measure(configuration, seconds)``, titles."""
