@@ -12,6 +12,7 @@ from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, sync_pl
 
 from tests import browser as chromium_browser
 from tests.browser_tests.console_page import SLOW_S, ConsolePage
+from tests.configured import LATE_TICKS, configured
 from tests.server.console_process import ConsoleProcess
 
 FOLDER = Path(__file__).parent
@@ -70,7 +71,9 @@ class Complaints:
 @pytest.fixture(scope="package")
 def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ConsoleProcess]:
     """Supervisor, control and web, running."""
-    with ConsoleProcess(tmp_path_factory.mktemp("browser"), "--plant", "kinematic") as running:
+    folder = tmp_path_factory.mktemp("browser")
+    patient = configured(folder, LATE_TICKS)
+    with ConsoleProcess(folder, *patient, "--plant", "kinematic") as running:
         running.wait_until_running()
         yield running
 

@@ -14,6 +14,7 @@ from tests.browser_tests.conftest import VIEWPORT, Complaints
 from tests.browser_tests.console_page import SCENE_S, SLOW_S, ConsolePage
 from tests.browser_tests.test_driving import tip_of
 from tests.browser_tests.test_page import layout_faults
+from tests.configured import LATE_TICKS, configured
 from tests.server.console_process import ConsoleProcess, eventually
 
 METHODS = {
@@ -59,7 +60,8 @@ def seated(
 ) -> Iterator[tuple[ConsolePage, Complaints]]:
     """A page on which the second robot was chosen in place of the first."""
     folder = tmp_path_factory.mktemp("concentric")
-    with ConsoleProcess(folder, "--plant", "kinematic") as console:
+    patient = configured(folder, LATE_TICKS)
+    with ConsoleProcess(folder, *patient, "--plant", "kinematic") as console:
         console.wait_until_running()
         context = browser.new_context(viewport=VIEWPORT, color_scheme="light")  # type: ignore[arg-type]
         context.set_default_timeout(SLOW_S * 1e3)

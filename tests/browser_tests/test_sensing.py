@@ -16,6 +16,7 @@ from server.configuration_file import load
 from tests.browser_tests.conftest import VIEWPORT, Complaints
 from tests.browser_tests.console_page import SLOW_S, ConsolePage
 from tests.browser_tests.test_page import layout_faults
+from tests.configured import LATE_TICKS, configured
 from tests.server.console_process import ConsoleProcess, eventually
 
 BARS = "[1, 2, 3, 4].map((n) => document.getElementById(`tension-${n}`).previousSibling)"
@@ -48,7 +49,8 @@ def watching(
     folder = tmp_path_factory.mktemp("sensing")
     kept = folder / "state" / "keyhole" / "calibration" / default_path(with_tension_unit()).name
     save(kept, Calibration())
-    with ConsoleProcess(folder, "--actuation", "tension-unit") as console:
+    patient = configured(folder, LATE_TICKS)
+    with ConsoleProcess(folder, *patient, "--actuation", "tension-unit") as console:
         console.wait_until_running()
         context = browser.new_context(viewport=VIEWPORT, color_scheme="light")  # type: ignore[arg-type]
         context.set_default_timeout(SLOW_S * 1e3)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from importlib import resources
 
 import pytest
 
+from tests.configured import LATE_LEADERS, LATE_TICKS, configured
 from tests.server.api_client import ApiClient
 from tests.server.console_process import ConsoleProcess
 
@@ -15,14 +15,8 @@ from tests.server.console_process import ConsoleProcess
 def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ConsoleProcess]:
     """Supervisor, control and web, running; patient with leaders, for the machine may be busy."""
     folder = tmp_path_factory.mktemp("console")
-    text = (resources.files("robot") / "keyhole.toml").read_text()
-    # Of the API's poses and of a stylus.
-    patient = text.replace("timeout_ms = 25.0", "timeout_ms = 1500.0")
-    patient = patient.replace("gizmo_timeout_ms = 120.0", "gizmo_timeout_ms = 1500.0")
-    assert patient.count("= 1500.0") == 3
-    config = folder / "patient.toml"
-    config.write_text(patient)
-    with ConsoleProcess(folder, "--config", str(config), "--plant", "kinematic") as running:
+    patient = configured(folder, LATE_TICKS, LATE_LEADERS)
+    with ConsoleProcess(folder, *patient, "--plant", "kinematic") as running:
         running.wait_until_running()
         yield running
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from importlib import resources
 
 import numpy as np
 import pytest
 
+from tests.configured import LATE_TICKS, configured
 from tests.server.api_client import JSON, ApiClient
 from tests.server.console_process import ConsoleProcess
 
@@ -18,13 +18,9 @@ CONFIGURED = [400.0, 0.0, 120.0]
 def nearly_out(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ConsoleProcess]:
     """A console whose instrument wakes up a little bent and almost drawn out."""
     folder = tmp_path_factory.mktemp("trocar")
-    text = (resources.files("robot") / "keyhole.toml").read_text()
-    for old, new in (("bend_deg = 60.0", "bend_deg = 8.0"), ("shaft = 0.4 ", "shaft = 0.9 ")):
-        assert old in text
-        text = text.replace(old, new)
-    (folder / "nearly-out.toml").write_text(text)
-    options = ("--config", str(folder / "nearly-out.toml"), "--plant", "kinematic")
-    with ConsoleProcess(folder, *options, "--board", "none") as running:
+    nearly = {"bend_deg = 60.0": "bend_deg = 8.0", "shaft = 0.4 ": "shaft = 0.9 "}
+    options = (*configured(folder, nearly, LATE_TICKS), "--plant", "kinematic", "--board", "none")
+    with ConsoleProcess(folder, *options) as running:
         running.wait_until_running()
         yield running
 

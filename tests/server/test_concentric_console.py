@@ -7,7 +7,6 @@ import json
 import time
 from collections.abc import Iterator
 from functools import partial
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ from server.recording.writer import RecordingWriter
 from server.web.concentric_message import ConcentricMessages
 from server.web.state_message import OperatorView, Surroundings
 from server.web.state_schema import ConcentricState
+from tests.configured import LATE_LEADERS, LATE_TICKS, configured
 from tests.robot.concentric.tube_drive import concentric
 from tests.server.api_client import ApiClient, newest
 from tests.server.console_process import ConsoleProcess, eventually
@@ -125,11 +125,7 @@ def test_nothing_compiles_once_real_time_has_begun() -> None:
 def tubes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ConsoleProcess]:
     """A console that drives the concentric-tube arms."""
     folder = tmp_path_factory.mktemp("tubes")
-    text = (resources.files("robot") / "keyhole.toml").read_text()
-    config = folder / "patient.toml"
-    # The machine may be busy: a leader may be late.
-    config.write_text(text.replace("api_timeout_ms = 25.0", "api_timeout_ms = 1500.0"))
-    arguments = ("--robot", "concentric", "--config", str(config))
+    arguments = ("--robot", "concentric", *configured(folder, LATE_TICKS, LATE_LEADERS))
     with ConsoleProcess(folder, *arguments, robot="concentric") as running:
         running.wait_until_running()
         yield running

@@ -26,6 +26,7 @@ from server.run import headless as headless_run
 from server.run.headless import SETTLING_S, TRACE_COLUMNS
 from server.supervision.child_process import module_command, module_environment
 from tests import own_kinematics
+from tests.configured import configured
 from tests.server import headless
 
 HEAD = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n"
@@ -348,11 +349,8 @@ def test_what_is_not_text_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_a_start_out_of_reach_is_refused_before_anything_moves(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    default = Path(__file__).resolve().parents[2] / "robot" / "keyhole.toml"
-    text = default.read_text().replace("[0.400, 0.0, 0.120] ", "[1.9, 0.0, 0.1] ")
-    file = tmp_path / "far.toml"
-    file.write_text(text)
-    assert "cannot be reached" in refused(["run", "circle", "--config", str(file)], capsys)
+    far = configured(tmp_path, {"[0.400, 0.0, 0.120] ": "[1.9, 0.0, 0.1] "})
+    assert "cannot be reached" in refused(["run", "circle", *far], capsys)
 
 
 def test_the_program_itself_refuses_without_a_traceback(tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ import signal
 import subprocess
 import termios
 from collections.abc import Iterator
-from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -23,6 +22,7 @@ from server.memory.link_records import create_mapped_files
 from server.memory.replay_link import create_replay_files
 from server.supervision.child_process import module_environment
 from server.supervision.terminal import Terminal
+from tests.configured import LATE_TICKS, configured
 from tests.server.console_process import ConsoleProcess, command_line, eventually
 
 
@@ -41,10 +41,8 @@ def console(
 ) -> Iterator[ConsoleProcess]:
     """A console in a terminal; its lease outlasts a busy machine."""
     folder = tmp_path_factory.mktemp("console")
-    text = (resources.files("robot") / "keyhole.toml").read_text()
-    config = folder / "patient.toml"
-    config.write_text(text.replace("lease_seconds = 5.0", "lease_seconds = 600.0"))
-    options = ("--config", str(config), "--plant", "kinematic")
+    long_lease = {"lease_seconds = 5.0": "lease_seconds = 600.0"}
+    options = (*configured(folder, long_lease, LATE_TICKS), "--plant", "kinematic")
     with ConsoleProcess(folder, *options, terminal=pty[1]) as running:
         running.wait_until_running()
         running.take_lease()

@@ -17,6 +17,7 @@ import pytest
 
 from server.command_line import main
 from server.supervision.child_process import module_environment
+from tests.configured import LATE_TICKS, configured
 from tests.server.console_process import (
     ConsoleProcess,
     command_line,
@@ -30,7 +31,8 @@ QUICK = ("--plant", "kinematic")
 
 @pytest.fixture(scope="module")
 def console(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ConsoleProcess]:
-    with ConsoleProcess(tmp_path_factory.mktemp("console"), *QUICK) as running:
+    folder = tmp_path_factory.mktemp("console")
+    with ConsoleProcess(folder, *configured(folder, LATE_TICKS), *QUICK) as running:
         running.wait_until_running()
         yield running
 
@@ -209,14 +211,8 @@ def test_a_broken_configuration_is_refused(
 
 
 def test_a_start_that_cannot_be_reached_ends_the_console(tmp_path: Path) -> None:
-    default = Path(__file__).resolve().parents[2] / "robot" / "keyhole.toml"
-    far = tmp_path / "far.toml"
-    far.write_text(
-        default.read_text().replace(
-            "position_m = [0.400, 0.0, 0.120]", "position_m = [4.0, 0.0, 0.120]"
-        )
-    )
-    with ConsoleProcess(tmp_path, "--config", str(far)) as console:
+    far = {"position_m = [0.400, 0.0, 0.120]": "position_m = [4.0, 0.0, 0.120]"}
+    with ConsoleProcess(tmp_path, *configured(tmp_path, far)) as console:
         assert console.process.wait(60.0) == 2
         assert "the start cannot be reached" in console.errors()
         assert "Traceback" not in console.errors()

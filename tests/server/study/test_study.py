@@ -19,6 +19,7 @@ from robot.errors import KeyholeError
 from server.command_line import main
 from server.commands.study import seeds
 from server.supervision.child_process import module_command, module_environment
+from tests.configured import configured
 
 PATIENCE_S = 120.0
 TINY = ["study", "--plants", "kinematic", "--experiments", "circle,arc", "--cases", "0,1"]
@@ -143,10 +144,8 @@ def test_an_interrupted_study_ends_in_order(tmp_path: Path) -> None:
 def test_a_run_that_cannot_be_made_is_named_and_the_rest_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    default = Path(__file__).resolve().parents[3] / "robot" / "keyhole.toml"
-    far = tmp_path / "far.toml"
-    far.write_text(default.read_text().replace("[0.400, 0.0, 0.120] ", "[1.9, 0.0, 0.1] "))
-    arguments = ["study", "--plants", "kinematic", "--experiments", "square", "--config", str(far)]
+    far = configured(tmp_path, {"[0.400, 0.0, 0.120] ": "[1.9, 0.0, 0.1] "})
+    arguments = ["study", "--plants", "kinematic", "--experiments", "square", *far]
     assert main([*arguments, "--out", str(tmp_path / "study"), "--jobs", "1"]) == 1
     output = capsys.readouterr()
     assert "0 of 1 runs are finished" in output.out
