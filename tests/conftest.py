@@ -6,6 +6,7 @@ import functools
 import os
 import random
 import sys
+import time
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,8 +19,10 @@ from xdist.scheduler import LoadScopeScheduling
 
 from robot.configuration import Configuration
 from tests import browser
+from tests.stalls import StallWatch, in_words
 
 ROOT = Path(__file__).resolve().parent.parent
+WATCH, BEGAN = pytest.StashKey[StallWatch](), pytest.StashKey[float]()
 
 
 @pytest.fixture(autouse=True)
@@ -73,6 +76,35 @@ def chromium() -> str:
     return path
 
 
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Watch for stalls of the machine from here on."""
+    session.config.stash[WATCH] = StallWatch()
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Watch no more."""
+    if WATCH in config.stash:
+        config.stash[WATCH].close()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let a test that failed while the machine stood still run again, twice at most."""
+    for item in items:
+        stood_still = functools.partial(_stood_still, item)
+        item.add_marker(pytest.mark.flaky(reruns=2, condition=stood_still))
+
+
+def _stood_still(item: pytest.Item) -> bool:
+    stalls = item.config.stash[WATCH].since(item.stash[BEGAN])
+    return bool(stalls)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Remember when this try of the test began."""
+    item.stash[BEGAN] = time.monotonic()
+
+
 class ByConsole(LoadScopeScheduling):  # type: ignore[misc] # xdist has no types
     """Keeps together on one processor what shares a console, runs, or a file's fixtures."""
 
@@ -98,8 +130,12 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> ByConso
     return ByConsole(config, log)
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Name the checks that failed before pytest began, right above its closing line."""
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    """Tell of stalls, and name the checks that failed before pytest began."""
+    if WATCH in config.stash and (stalls := config.stash[WATCH].since(0.0)):
+        terminalreporter.write_line(in_words(stalls))
     failed = os.environ.get("KEYHOLE_FAILED_CHECKS")
     if failed:
         terminalreporter.write_line(f"FAILED before pytest: {failed} (see the top)", red=True)
