@@ -49,11 +49,13 @@ def running(tmp_path: Path) -> Iterator[Running]:
     )
     os.close(reading)
     link = WebLink(directory.path)
-    eventually(lambda: link.ring().sequence > 10, "control ticks", START_S)
-    yield Running(process, link, writing)
-    process.kill()
-    process.communicate()
-    directory.give_back()
+    try:
+        eventually(lambda: link.ring().sequence > 10, "control ticks", START_S)
+        yield Running(process, link, writing)
+    finally:
+        process.kill()
+        process.communicate()
+        directory.give_back()
 
 
 def ask(link: WebLink, request: Request) -> Any:

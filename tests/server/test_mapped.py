@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -52,18 +53,17 @@ def wide(value: int) -> NDArray[Any]:
     return record
 
 
-def start(source: str, *arguments: str) -> subprocess.Popen[bytes]:
-    process = subprocess.Popen(
-        [sys.executable, "-c", source, *arguments], cwd=ROOT, stdout=subprocess.PIPE
-    )
-    assert process.stdout is not None
-    assert process.stdout.readline() == b"ready\n"
-    return process
-
-
-def end(process: subprocess.Popen[bytes], number: signal.Signals = signal.SIGKILL) -> None:
-    process.send_signal(number)
-    process.communicate()
+@contextlib.contextmanager
+def running(source: str, *arguments: str) -> Iterator[None]:
+    """A program in a process of its own, killed at the end, whatever it is doing."""
+    command = [sys.executable, "-c", source, *arguments]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == b"ready\n"
+            yield
+        finally:
+            process.kill()
 
 
 def test_a_slot_gives_back_what_was_written(tmp_path: Path) -> None:
@@ -84,15 +84,14 @@ def test_an_empty_slot_says_so(tmp_path: Path) -> None:
 def test_no_torn_record_is_accepted_from_a_writer_at_full_speed(tmp_path: Path) -> None:
     slot = MappedSlot(tmp_path / "a", WIDE, create=True)
     slot.write(wide(0))
-    writer = start(WRITER, "slot", str(slot.path))
     out, last, reads = wide(0), 0, 0
-    ends = time.monotonic() + 2.0
-    while time.monotonic() < ends:
-        values = slot.read(out)["values"][0]
-        assert (values == values[0]).all()
-        assert values[0] >= last
-        last, reads = int(values[0]), reads + 1
-    end(writer)
+    with running(WRITER, "slot", str(slot.path)):
+        ends = time.monotonic() + 2.0
+        while time.monotonic() < ends:
+            values = slot.read(out)["values"][0]
+            assert (values == values[0]).all()
+            assert values[0] >= last
+            last, reads = int(values[0]), reads + 1
     assert reads > 1000
     assert last > 1000
 
@@ -101,9 +100,8 @@ def test_a_killed_writer_leaves_the_last_whole_record(tmp_path: Path) -> None:
     path = tmp_path / "a"
     MappedSlot(path, WIDE, create=True).close()
     for _ in range(5):
-        writer = start(WRITER, "slot", str(path))
-        time.sleep(0.03)
-        end(writer)
+        with running(WRITER, "slot", str(path)):
+            time.sleep(0.03)
         slot = MappedSlot(path, WIDE, writable=True)
         values = slot.read()["values"][0]
         assert (values == values[0]).all()
@@ -135,10 +133,9 @@ def test_a_killed_reader_does_no_harm(tmp_path: Path) -> None:
     slot = MappedSlot(tmp_path / "a", WIDE, create=True)
     slot.write(wide(1))
     for _ in range(3):
-        reader = start(READER, str(slot.path))
-        for value in range(200):
-            slot.write(wide(value))
-        end(reader)
+        with running(READER, str(slot.path)):
+            for value in range(200):
+                slot.write(wide(value))
     assert (slot.read()["values"] == 199).all()
     assert slot.path.exists()
 
@@ -181,21 +178,20 @@ def test_a_ring_reads_in_portions(tmp_path: Path) -> None:
 
 def test_a_ring_read_at_full_speed_is_whole_and_its_gaps_are_told(tmp_path: Path) -> None:
     ring = MappedRing(tmp_path / "a", WIDE, 64, create=True)
-    writer = start(WRITER, "ring", str(ring.path))
     following, expected, seen, gap = 0, 1, 0, False
-    ends = time.monotonic() + 2.0
-    while time.monotonic() < ends:
-        records, following, lost = ring.read_since(following)
-        # A reader that is stopped while it copies may get nothing but the word of a gap.
-        gap |= lost
-        for values in records["values"]:
-            assert (values == values[0]).all()
-            if not gap:
-                assert values[0] == expected
-            gap = False
-            expected = int(values[0]) + 1
-            seen += 1
-    end(writer)
+    with running(WRITER, "ring", str(ring.path)):
+        ends = time.monotonic() + 2.0
+        while time.monotonic() < ends:
+            records, following, lost = ring.read_since(following)
+            # A reader that is stopped while it copies may get nothing but the word of a gap.
+            gap |= lost
+            for values in records["values"]:
+                assert (values == values[0]).all()
+                if not gap:
+                    assert values[0] == expected
+                gap = False
+                expected = int(values[0]) + 1
+                seen += 1
     assert seen > 1000
 
 

@@ -120,21 +120,23 @@ def test_a_planned_fault_comes_and_goes() -> None:
 def test_the_command_serves_until_it_is_told_to_stop(tmp_path: Path) -> None:
     path = tmp_path / "arm.control"
     command = [sys.executable, "-m", "server.command_line", "fake-arm", "--listen", str(address())]
-    process = subprocess.Popen(
+    with subprocess.Popen(
         [*command, "--control", str(path)],
         cwd=ROOT,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         stdout=subprocess.PIPE,
         text=True,
-    )
-    assert process.stdout is not None
-    assert str(address()) in process.stdout.readline()
-    channel = Channel(path)
-    joints = channel.ask(state=True)["joints_rad"]
-    np.testing.assert_allclose(reported(), joints, rtol=0, atol=1e-5)
-    assert not np.allclose(joints, START)
-    channel.close()
-    process.send_signal(signal.SIGTERM)
-    assert process.wait(20.0) == 0
-    process.stdout.close()
+    ) as process:
+        try:
+            assert process.stdout is not None
+            assert str(address()) in process.stdout.readline()
+            channel = Channel(path)
+            joints = channel.ask(state=True)["joints_rad"]
+            np.testing.assert_allclose(reported(), joints, rtol=0, atol=1e-5)
+            assert not np.allclose(joints, START)
+            channel.close()
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(20.0) == 0
+        finally:
+            process.kill()
     assert not path.exists()

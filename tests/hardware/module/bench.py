@@ -107,6 +107,8 @@ class Bench:
         """Clear all faults, home if need be, and be as a control loop that has just enabled."""
         self.servos.clear()
         self.until(lambda reading: reading.readiness != Readiness.NOT_CONNECTED)
+        if self.devices()["servos"]["hardware_error"].any():
+            self.module.reboot()
         self.until(lambda reading: reading.event == 0)
         if self.read().readiness != Readiness.READY:
             message = self.home()

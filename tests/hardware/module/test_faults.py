@@ -13,13 +13,21 @@ from tests.hardware.module.bench import Bench
 
 
 def _holds(made: Bench) -> None:
-    """The old motion may go on and changes nothing."""
+    """The old motion may go on and changes nothing.
+
+    A servo that has let go is left out: prepared again after a gap, it is told where it sags to.
+    """
     settled = time.monotonic() + 0.05
     made.moving_until(lambda _: time.monotonic() > settled)
-    goals = made.goals()
+    goals = _held(made)
     end = settled + 0.15
     made.moving_until(lambda _: time.monotonic() > end)
-    assert made.goals() == goals
+    assert _held(made) == goals
+
+
+def _held(made: Bench) -> dict[int, int]:
+    servos = made.servos.state()["servos"]
+    return {servo["id"]: servo["goal"] for servo in servos if servo["torque"]}
 
 
 @pytest.mark.parametrize("fault", ["crc-flip", "truncated", "wrong-id", "duplicate", "late"])

@@ -86,16 +86,18 @@ def test_a_drop_out_breaks_the_connection_for_its_time(fake: RunningStylus) -> N
 def test_the_command_plays_until_it_is_asked_to_end(tmp_path: Path) -> None:
     control = tmp_path / "control"
     arguments = ("fake-stylus", "--listen", "ws://127.0.0.1:0", "--control", str(control))
-    program = subprocess.Popen(
+    with subprocess.Popen(
         command_line(*arguments), stdout=subprocess.PIPE, text=True, env=module_environment()
-    )
-    assert program.stdout is not None
-    with program.stdout as output:
-        words = output.readline()
-        assert "ws://127.0.0.1:" in words
-        assert str(control) in words
-        program.terminate()
-        assert program.wait(20.0) == 0
+    ) as program:
+        try:
+            assert program.stdout is not None
+            words = program.stdout.readline()
+            assert "ws://127.0.0.1:" in words
+            assert str(control) in words
+            program.terminate()
+            assert program.wait(20.0) == 0
+        finally:
+            program.kill()
     assert not control.exists()
 
 
