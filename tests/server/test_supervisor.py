@@ -81,7 +81,8 @@ def test_it_starts_disabled_and_ticks(console: ConsoleProcess) -> None:
     eventually(lambda: console.state()["tick"] > state["tick"] + 100, "ticks")
     realtime = state["loop"]["realtime"]
     assert realtime.startswith(("SCHED_FIFO", "off: "))
-    assert f"real-time scheduling: {realtime}" in console.errors()
+    said = f"real-time scheduling: {realtime}"
+    eventually(lambda: said in console.errors(), "it is said")
 
 
 def test_its_files_are_closed_to_others(console: ConsoleProcess) -> None:
@@ -116,7 +117,8 @@ def test_web_is_restarted_and_control_goes_on(console: ConsoleProcess) -> None:
     assert state["safety"]["reason_code"] == "operator_lost"
     assert console.children()[0] == control
     assert console.call("GET", "/api/v1/health")["status"] == "ok"
-    assert "web ended unexpectedly (signal SIGKILL)" in console.errors()
+    said = "web ended unexpectedly (signal SIGKILL)"
+    eventually(lambda: said in console.errors(), "it is said")
 
 
 def test_a_killed_control_process_is_down_and_comes_back_disabled(
@@ -143,7 +145,7 @@ def test_a_control_process_that_hangs_is_replaced(console: ConsoleProcess) -> No
     os.kill(control, signal.SIGSTOP)
     eventually(lambda: console.children()[0] not in (0, control), "control is replaced", 20.0)
     assert console.wait_until_running()["safety"]["state"] == "DISABLED"
-    assert "has not ticked" in console.errors()
+    eventually(lambda: "has not ticked" in console.errors(), "it is said")
 
 
 def ends_in_order(console: ConsoleProcess, number: signal.Signals) -> None:
