@@ -95,8 +95,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def _stood_still(item: pytest.Item) -> bool:
-    stalls = item.config.stash[WATCH].since(item.stash[BEGAN])
-    return bool(stalls)
+    return bool(item.config.stash[WATCH].since(item.stash[BEGAN]))
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -23,26 +23,9 @@ from server.run.sensing_traces import coverage_arrays, packed
 from server.study.folder import StudyFolder
 from server.study.study import StudyResult
 from tests.server import headless
-from tests.server.report.test_report import Page
+from tests.server.report.page import Page, stands_alone
 
 COMMAND = ["report", "--robot", "sensing", "--quick"]
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("sensing")
-    assert main([*COMMAND, "--out", str(path), "--jobs", "2"]) == 0
-    return path
-
-
-@pytest.fixture(scope="module")
-def text(folder: Path) -> str:
-    return (folder / "report.html").read_text(encoding="utf-8")
-
-
-@pytest.fixture(scope="module")
-def page(text: str) -> Page:
-    return Page(text)
 
 
 def test_only_its_own_sections_are_there(page: Page, folder: Path) -> None:
@@ -54,14 +37,7 @@ def test_only_its_own_sections_are_there(page: Page, folder: Path) -> None:
 
 
 def test_the_page_stands_alone_and_refers_to_what_it_has(text: str, page: Page) -> None:
-    assert "http" not in text
-    ids = [attributes["id"] for _, attributes in page.elements if "id" in attributes]
-    assert len(ids) == len(set(ids))
-    referred = set(re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', text))
-    assert {one or other for one, other in referred} <= set(ids)
-    used = set(re.findall(r"var\((--[\w-]+)\)", text))
-    assert used <= set(re.findall(r"(--[\w-]+):", text))
-    assert not re.search(r"#0101\d\d", text)
+    stands_alone(text, page)
 
 
 def test_the_paper_s_figures_are_there_with_units(page: Page) -> None:

@@ -12,26 +12,9 @@ from server.command_line import main
 from server.report.tube_sections import LINKS
 from server.report.tube_tasks import LABELS, QUICK_POINTS, tube_tasks
 from tests.server import headless
-from tests.server.report.test_report import Page
+from tests.server.report.page import Page, stands_alone
 
 COMMAND = ["report", "--robot", "concentric", "--quick"]
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("tubes")
-    assert main([*COMMAND, "--out", str(path), "--jobs", "2"]) == 0
-    return path
-
-
-@pytest.fixture(scope="module")
-def text(folder: Path) -> str:
-    return (folder / "report.html").read_text(encoding="utf-8")
-
-
-@pytest.fixture(scope="module")
-def page(text: str) -> Page:
-    return Page(text)
 
 
 def test_only_this_robot_s_sections_are_there(page: Page, folder: Path) -> None:
@@ -44,14 +27,7 @@ def test_only_this_robot_s_sections_are_there(page: Page, folder: Path) -> None:
 
 
 def test_the_page_stands_alone_and_refers_to_what_it_has(text: str, page: Page) -> None:
-    assert "http" not in text
-    ids = [attributes["id"] for _, attributes in page.elements if "id" in attributes]
-    assert len(ids) == len(set(ids))
-    referred = set(re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', text))
-    assert {one or other for one, other in referred} <= set(ids)
-    used = set(re.findall(r"var\((--[\w-]+)\)", text))
-    assert used <= set(re.findall(r"(--[\w-]+):", text))
-    assert not re.search(r"#0101\d\d", text)
+    stands_alone(text, page)
 
 
 def test_figures_of_every_method_have_units(page: Page) -> None:
